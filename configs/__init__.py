@@ -1,0 +1,1 @@
+"""Sweeps that ship with freepath; `freepath run NAME` finds them by name."""

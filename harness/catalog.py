@@ -1,0 +1,232 @@
+"""The trackers: each is one .cl file whose front matter says what it is, needs and takes.
+
+`python -m freepath.catalog FILE` writes the JSON Schema of configs, which names the trackers.
+"""
+
+import importlib.resources
+import json
+import re
+import sys
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any
+
+from freepath.config.base import Kind, Model
+from freepath.config.document import Document
+from freepath.config.loading import read_text
+from freepath.config.quantity import UNITS, Number
+from freepath.config.rules import Choice, Flag, OneOrMore, Rule, Text, expected, failure
+from freepath.config.schema import json_schema
+from freepath.config.sweep import ESTIMANDS
+from freepath.errors import CatalogError, ConfigError, Problem
+from pydantic import ValidationInfo, create_model, field_validator
+
+NEEDS = ("majorant", "closed_form", "cells")
+FRONT_MATTER = re.compile(r"\A\s*/\*---[ \t]*\n(.*?)^[ \t]*---\*/", re.DOTALL | re.MULTILINE)
+IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+# fmt: off
+C_WORDS = frozenset((
+    "auto", "break", "case", "char", "const", "continue", "default", "do", "double", "else",
+    "enum", "extern", "float", "for", "goto", "half", "if", "inline", "int", "long",
+    "register", "restrict", "return", "short", "signed", "sizeof", "static", "struct",
+    "switch", "typedef", "union", "unsigned", "void", "volatile", "while", "kernel", "global",
+    "local", "constant", "private",
+))
+# fmt: on
+
+Bound = Annotated[float, Number()] | None
+
+
+class Parameter(Model):
+    """A parameter of a tracker: a number within bounds, or one of some choices."""
+
+    unit: Annotated[str, Choice(tuple(UNITS))] = ""
+    minimum: Bound = None
+    above: Bound = None
+    maximum: Bound = None
+    below: Bound = None
+    choices: Annotated[tuple[Any, ...], OneOrMore()] | None = None
+    meaning: Annotated[str, Text()] | None = None
+    default: Any
+
+    @field_validator("choices", mode="after")
+    @classmethod
+    def _defines(cls, choices: tuple[Any, ...] | None) -> tuple[Any, ...] | None:
+        # a choice becomes a #define, so it must be a word or an integer there too
+        for choice in choices or ():
+            if not is_identifier(choice) and type(choice) is not int:
+                raise expected("words or integers as choices", choice)
+        return choices
+
+    @field_validator("default", mode="after")
+    @classmethod
+    def _allowed(cls, default: Any, info: ValidationInfo) -> Any:
+        if len(info.data) < len(cls.model_fields) - 1:
+            return default  # another key is wrong and reported, so the rule is not known
+        return _rule(info.data).check(default, None)
+
+    def rule(self) -> Rule:
+        """Return what a config may give for this parameter."""
+        return _rule(dict(self))
+
+
+def _rule(keys: dict[str, Any]) -> Rule:
+    bounds = {name: keys[name] for name in ("minimum", "above", "maximum", "below")}
+    if keys["choices"] is None:
+        return Number(keys["unit"], **bounds)
+    if keys["unit"] or any(bound is not None for bound in bounds.values()):
+        raise failure("expected choices without a unit or bounds, got both")
+    return Choice(keys["choices"])
+
+
+class FrontMatter(Model):
+    """The YAML in the first comment of a tracker's file."""
+
+    title: Annotated[str, Text()]
+    estimands: Annotated[tuple[Annotated[str, Choice(ESTIMANDS)], ...], OneOrMore()]
+    needs: Annotated[tuple[Annotated[str, Choice(NEEDS)], ...], OneOrMore(optional=True)] = ()
+    channels: Annotated[int, Number("count", minimum=1)] = 1
+    bounding: Annotated[bool, Flag()] = False
+    unbiased: Annotated[bool, Flag()] = True
+    parameters: dict[str, Parameter] = {}
+    citation: Annotated[str, Text()] | None = None
+
+    @field_validator("parameters", mode="before")
+    @classmethod
+    def _names(cls, parameters: Any) -> Any:
+        if parameters is None:
+            return {}
+        if not isinstance(parameters, dict):
+            raise expected("a mapping of parameter names", parameters)
+        for name in parameters:
+            if not is_identifier(name) or hasattr(Kind, name):
+                raise failure(f"expected a C identifier as the parameter's name, got '{name}'")
+        return parameters
+
+
+@dataclass(frozen=True)
+class Tracker:
+    """A tracker: the front matter of its file, and the file's text with it."""
+
+    name: str
+    path: Path
+    source: str
+    title: str
+    estimands: tuple[str, ...]
+    needs: frozenset[str]
+    channels: int
+    bounding: bool
+    unbiased: bool
+    parameters: dict[str, Parameter]
+    citation: str
+    model: type[Kind] = field(repr=False)
+
+
+@dataclass(frozen=True)
+class Catalog:
+    """The trackers by name."""
+
+    trackers: dict[str, Tracker]
+
+    def parameter_models(self) -> dict[str, type[Kind]]:
+        """Return what config.load needs: the model of each tracker's parameters, by name."""
+        return {name: tracker.model for name, tracker in self.trackers.items()}
+
+
+def is_identifier(name: Any) -> bool:
+    """Tell whether a name can stand in OpenCL C; an underscore first is left to the compiler."""
+    return isinstance(name, str) and bool(IDENTIFIER.fullmatch(name)) and name not in C_WORDS
+
+
+def load(directories: Iterable[Path | str] = (), *, builtin: bool = True) -> Catalog:
+    """Load the trackers of freepath (unless not `builtin`) and of further folders of .cl files.
+
+    Raises CatalogError with every problem of every file.
+    """
+    files: list[Path] = _builtin_files() if builtin else []
+    problems: list[Problem] = []
+    for directory in directories:
+        found = sorted(Path(directory).glob("*.cl"))
+        if not found:
+            problem = "expected a folder with .cl files, got none"
+            problems.append(Problem(str(directory), 0, 0, "", problem))
+        files += found
+    trackers: dict[str, Tracker] = {}
+    for file in files:
+        try:
+            tracker = read(file)
+            if tracker.name in trackers and file.resolve() != trackers[tracker.name].path.resolve():
+                first = trackers[tracker.name].path
+                raise _bad(file, f"expected a new name, got '{file.stem}' again (first in {first})")
+        except ConfigError as error:
+            problems += error.problems
+        else:
+            trackers[tracker.name] = tracker
+    if problems:
+        raise CatalogError("\n".join(str(problem) for problem in problems))
+    return Catalog(dict(sorted(trackers.items())))
+
+
+def _builtin_files() -> list[Path]:
+    folder = importlib.resources.files("freepath.kernels").joinpath("trackers")
+    if not folder.is_dir():
+        return []
+    return sorted(Path(str(item)) for item in folder.iterdir() if item.name.endswith(".cl"))
+
+
+def _bad(file: Path, message: str) -> ConfigError:
+    return ConfigError([Problem(str(file), 1, 1, "", message)])
+
+
+def read(file: Path) -> Tracker:
+    """Read one tracker; raises ConfigError with the problems of its front matter."""
+    if not is_identifier(file.stem):
+        raise _bad(file, f"expected a C identifier as the file's name, got '{file.stem}'")
+    source = read_text(file).replace("\r\n", "\n")
+    match = FRONT_MATTER.match(source)
+    if not match:
+        raise _bad(file, "expected front matter, /*--- ... ---*/, as the first comment")
+    # empty lines stand for what is before it, so that positions are those in the file
+    text = "\n" * source.count("\n", 0, match.start(1)) + match[1]
+    document = Document.parse(str(file), text)
+    if document.data is None:
+        raise _bad(file, "expected title and estimands in the front matter, got nothing")
+    front: FrontMatter = document.validate(FrontMatter)
+    return Tracker(
+        name=file.stem,
+        path=file,
+        source=source,
+        title=front.title,
+        estimands=front.estimands,
+        needs=frozenset(front.needs),
+        channels=front.channels,
+        bounding=front.bounding,
+        unbiased=front.unbiased,
+        parameters=front.parameters,
+        citation=front.citation or "",
+        model=_parameter_model(file.stem, front),
+    )
+
+
+def _parameter_model(name: str, front: FrontMatter) -> type[Kind]:
+    fields: dict[str, Any] = {
+        key: (Annotated[Any, parameter.rule()], parameter.default)
+        for key, parameter in front.parameters.items()
+    }
+    model = create_model(name, __base__=Kind, __doc__=front.title, **fields)
+    model.kind = name
+    return model
+
+
+def main(arguments: list[str]) -> None:
+    """Write the JSON Schema of configs to a file, or to standard output."""
+    text = json.dumps(json_schema(load().parameter_models()), indent=1, ensure_ascii=False) + "\n"
+    if arguments:
+        Path(arguments[0]).write_text(text, encoding="utf-8")
+    else:
+        sys.stdout.write(text)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

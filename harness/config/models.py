@@ -1,0 +1,275 @@
+"""The kinds of media, majorants and rays that a config may name, with their parameters."""
+
+import math
+from typing import Annotated, ClassVar, Literal
+
+from freepath.config.base import Kind
+from freepath.config.quantity import Number
+from freepath.config.rules import Choice, Exactly, OneOrMore, Text, expected, failure
+from pydantic import AfterValidator, ValidationInfo, field_validator
+
+LARGEST_SEED = 2**64 - 1
+LARGEST_GRID = 1024
+MOST_CELLS = 2**27
+LARGEST_IMAGE = 4096
+MOST_CHORDS = 10_000_000
+
+CLOSED_FORM = frozenset({"closed_form"})
+CELLS = frozenset({"cells"})
+
+
+def _not_zero(direction: tuple[float, ...]) -> tuple[float, ...]:
+    if not any(direction):
+        raise failure("expected a direction that is not zero, got [0, 0, 0]")
+    return direction
+
+
+def _not_too_many(resolution: tuple[int, ...]) -> tuple[int, ...]:
+    cells = math.prod(resolution)
+    if cells > MOST_CELLS:
+        raise failure(f"expected at most {MOST_CELLS} cells, got {cells}")
+    return resolution
+
+
+Length = Annotated[float, Number("length")]
+Side = Annotated[float, Number("length", above=0)]
+Extinction = Annotated[float, Number("1/length", minimum=0)]
+Real = Annotated[float, Number()]
+Seed = Annotated[int, Number("count", minimum=0, maximum=LARGEST_SEED)]
+Cells = Annotated[int, Number("count", minimum=1)]
+Pixels = Annotated[int, Number("count", minimum=1, maximum=LARGEST_IMAGE)]
+Fraction = Annotated[float, Number("fraction", above=0, maximum=1)]
+
+Point = Annotated[tuple[Length, Length, Length], Exactly()]
+Direction = Annotated[tuple[Real, Real, Real], Exactly(), AfterValidator(_not_zero)]
+Size = Annotated[tuple[Side, Side, Side], Exactly(spread=True)]
+CellCounts = Annotated[
+    tuple[Cells, Cells, Cells], Exactly(spread=True), AfterValidator(_not_too_many)
+]
+Image = Annotated[tuple[Pixels, Pixels], Exactly(("width", "height"), spread=True)]
+Interpolation = Annotated[Literal["trilinear", "nearest"], Choice(("trilinear", "nearest"))]
+
+UNIT_CUBE = (1.0, 1.0, 1.0)
+UPWARD = (0.0, 0.0, 1.0)
+
+
+class Medium(Kind):
+    """A medium; OFFERS says what a tracker may ask of it beside sigma_t at a point."""
+
+    OFFERS: ClassVar[frozenset[str]] = frozenset()
+
+
+class Box(Medium):
+    """A medium with a closed form in the box [0, size]."""
+
+    OFFERS: ClassVar[frozenset[str]] = CLOSED_FORM
+
+
+class Homogeneous(Box):
+    """The same extinction everywhere."""
+
+    kind: ClassVar[str] = "homogeneous"
+    OFFERS: ClassVar[frozenset[str]] = CLOSED_FORM | CELLS
+    sigma_t: Extinction
+    """Extinction."""
+    size: Size = UNIT_CUBE
+    """Sides of the box."""
+
+
+class Linear(Box):
+    """Extinction that changes linearly with the height."""
+
+    kind: ClassVar[str] = "linear"
+    bottom: Extinction
+    """Extinction at z = 0."""
+    top: Extinction
+    """Extinction at the top of the box."""
+    size: Size = UNIT_CUBE
+    """Sides of the box."""
+
+
+class Exponential(Box):
+    """An atmosphere: sigma_t * exp(-z / scale_height)."""
+
+    kind: ClassVar[str] = "exponential"
+    sigma_t: Extinction
+    """Extinction at z = 0."""
+    scale_height: Side
+    """Height in which the extinction falls to 1/e."""
+    size: Size = UNIT_CUBE
+    """Sides of the box."""
+
+
+class Gaussian(Box):
+    """A blob: sigma_t * exp(-r^2 / (2 width^2)), r from the centre."""
+
+    kind: ClassVar[str] = "gaussian"
+    sigma_t: Extinction
+    """Extinction at the centre."""
+    width: Side
+    """Standard deviation."""
+    center: Point | None = None
+    """Centre of the blob; the middle of the box if left out."""
+    size: Size = UNIT_CUBE
+    """Sides of the box."""
+
+
+class Cosine(Box):
+    """Waves: sigma_t * (1 + amplitude * cos(2 pi periods z / height + phase))."""
+
+    kind: ClassVar[str] = "cosine"
+    sigma_t: Extinction
+    """Mean extinction."""
+    amplitude: Annotated[float, Number("fraction", minimum=0, maximum=1)]
+    """Amplitude relative to the mean."""
+    periods: Annotated[float, Number(above=0)]
+    """Periods over the height of the box."""
+    phase: Real = 0.0
+    """Phase in radians at z = 0."""
+    size: Size = UNIT_CUBE
+    """Sides of the box."""
+
+
+class Layered(Box):
+    """Layers of constant extinction, from the bottom to the top."""
+
+    kind: ClassVar[str] = "layered"
+    OFFERS: ClassVar[frozenset[str]] = CLOSED_FORM | CELLS
+    size: Size = UNIT_CUBE
+    """Sides of the box."""
+    breakpoints: Annotated[tuple[Side, ...], OneOrMore()]
+    """Heights between the layers, ascending, inside the box."""
+    values: Annotated[tuple[Extinction, ...], OneOrMore()]
+    """Extinctions of the layers: one more than breakpoints."""
+
+    @field_validator("breakpoints", mode="after")
+    @classmethod
+    def _ascend(cls, heights: tuple[float, ...], info: ValidationInfo) -> tuple[float, ...]:
+        top = info.data.get("size", (0, 0, float("inf")))[2]
+        for low, high in zip(heights, (*heights[1:], top), strict=True):
+            if low >= high:
+                limit = f"below the top of the box at {top:g}" if high == top else "ascending"
+                raise failure(f"expected heights that are {limit}, got {low:g} before {high:g}")
+        return heights
+
+    @field_validator("values", mode="after")
+    @classmethod
+    def _count(cls, values: tuple[float, ...], info: ValidationInfo) -> tuple[float, ...]:
+        layers = len(info.data.get("breakpoints", values[1:])) + 1
+        if len(values) != layers:
+            raise expected(f"{layers} values (one more than breakpoints)", values)
+        return values
+
+
+class Cloud(Medium):
+    """A procedural cloud on a grid of cubes, the same for the same seed and resolution."""
+
+    kind: ClassVar[str] = "cloud"
+    OFFERS: ClassVar[frozenset[str]] = CELLS
+    resolution: Annotated[int, Number("count", minimum=2, maximum=LARGEST_GRID)]
+    """Voxels along each side."""
+    seed: Seed = 1
+    """Which cloud."""
+    sigma_t: Extinction = 1.0
+    """Scales the density, whose maximum is 1."""
+    interpolation: Interpolation = "trilinear"
+    """How the density is read between voxel centres."""
+    size: Size = UNIT_CUBE
+    """Sides of the box."""
+
+
+class Volume(Medium):
+    """A grid from a file: .npy, multi-part EXR, multi-page TIFF or OpenVDB."""
+
+    kind: ClassVar[str] = "volume"
+    OFFERS: ClassVar[frozenset[str]] = CELLS
+    file: Annotated[str, Text("a file name")]
+    """Looked for beside the config, then in $FREEPATH_VOLUMES."""
+    sigma_t: Extinction = 1.0
+    """Scales the density."""
+    grid: Annotated[str, Text("the name of a grid")] | None = None
+    """Which grid of an OpenVDB file."""
+    interpolation: Interpolation = "trilinear"
+    """How the density is read between voxel centres."""
+    voxel_size: Size | None = None
+    """Sides of a voxel; overrides what the file says (which is 1 where it says nothing)."""
+
+
+class Global(Kind):
+    """One majorant for the whole medium."""
+
+    kind: ClassVar[str] = "global"
+
+
+class Grid(Kind):
+    """A majorant for each cell of a regular grid, walked by DDA."""
+
+    kind: ClassVar[str] = "grid"
+    resolution: CellCounts
+    """Cells along each side, one number or three."""
+
+
+class Orthographic(Kind):
+    """Parallel rays that frame the medium."""
+
+    kind: ClassVar[str] = "orthographic"
+    resolution: Image = (64, 64)
+    """Rays across and down."""
+    direction: Direction = UPWARD
+    """Where the rays go."""
+
+
+class Perspective(Kind):
+    """Rays from a pinhole camera."""
+
+    kind: ClassVar[str] = "perspective"
+    resolution: Image = (64, 64)
+    """Rays across and down."""
+    position: Point
+    """Where the camera stands."""
+    look_at: Point
+    """The point in the middle of the image."""
+    field_of_view: Annotated[float, Number(above=0, below=180)] = 45.0
+    """Vertical angle of view in degrees."""
+
+    @field_validator("look_at", mode="after")
+    @classmethod
+    def _elsewhere(cls, point: tuple[float, ...], info: ValidationInfo) -> tuple[float, ...]:
+        if point == info.data.get("position"):
+            raise failure("expected a point other than position, got the same one")
+        return point
+
+
+class Chords(Kind):
+    """Random chords of the box, isotropic and uniform (mu-random), from the config's seed."""
+
+    kind: ClassVar[str] = "chords"
+    count: Annotated[int, Number("count", minimum=1, maximum=MOST_CHORDS)]
+    """How many."""
+
+
+class Single(Kind):
+    """One ray."""
+
+    kind: ClassVar[str] = "single"
+    origin: Point
+    """Where it starts."""
+    direction: Direction
+    """Where it goes."""
+
+
+class File(Kind):
+    """Rays from a .npy of shape (N, 6) or a .csv with the header origin_x ... direction_z."""
+
+    kind: ClassVar[str] = "file"
+    path: Annotated[str, Text("a file name")]
+    """Looked for beside the config, then in $FREEPATH_VOLUMES."""
+
+
+def _by_kind(*models: type[Kind]) -> dict[str, type[Kind]]:
+    return {model.kind: model for model in models}
+
+
+MEDIA = _by_kind(Homogeneous, Linear, Exponential, Gaussian, Cosine, Layered, Cloud, Volume)
+MAJORANTS = _by_kind(Global, Grid)
+RAYS = _by_kind(Orthographic, Perspective, Chords, Single, File)

@@ -1,0 +1,171 @@
+"""A whole config: the matrix of axes, the entries that add and remove cases, when to stop."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+from freepath.config.base import Kind, Model, OneOf
+from freepath.config.document import Document, Location, path_text
+from freepath.config.models import MAJORANTS, MEDIA, RAYS, Fraction, Global, Orthographic, Seed
+from freepath.config.quantity import Number
+from freepath.config.rules import Choice, OneOrMore, Text, expected
+from freepath.errors import Problem
+from pydantic import (
+    Field,
+    PrivateAttr,
+    SerializerFunctionWrapHandler,
+    model_serializer,
+    model_validator,
+)
+
+ESTIMANDS = ("transmittance", "free_path", "mean_extinction")
+LANES = ("auto", 1, 2, 4, 8, 16)
+ARITHMETIC = ("strict", "fast", "double")
+# the word under which the models of the trackers are handed to a validation as its context
+TRACKER = "tracker"
+
+NAME = Text("a name of letters, digits, '.', '_' and '-'", r"[A-Za-z0-9][A-Za-z0-9._-]*")
+
+Estimands = Annotated[tuple[Annotated[str, Choice(ESTIMANDS)], ...], OneOrMore()]
+Media = Annotated[tuple[Annotated[Kind, OneOf("medium", MEDIA)], ...], OneOrMore()]
+Majorants = Annotated[tuple[Annotated[Kind, OneOf("majorant", MAJORANTS)], ...], OneOrMore()]
+Tightnesses = Annotated[tuple[Annotated[float, Number(above=0)], ...], OneOrMore()]
+Trackers = Annotated[tuple[Annotated[Kind, OneOf(TRACKER)], ...], OneOrMore()]
+Lanes = Annotated[tuple[Annotated[int | str, Choice(LANES)], ...], OneOrMore()]
+Arithmetics = Annotated[tuple[Annotated[str, Choice(ARITHMETIC)], ...], OneOrMore()]
+
+MediumPattern = Annotated[Kind, OneOf("medium", MEDIA, pattern=True)]
+MajorantPattern = Annotated[Kind, OneOf("majorant", MAJORANTS, pattern=True)]
+TrackerPattern = Annotated[Kind, OneOf(TRACKER, pattern=True)]
+
+
+class Matrix(Model):
+    """Axes whose every combination is a case; one value is an axis of one."""
+
+    estimand: Estimands = ("transmittance",)
+    """What a case estimates."""
+    medium: Media
+    """What the rays pass through."""
+    majorant: Majorants = (Global(),)
+    """Upper bounds of the extinction; trackers that need none ignore this axis."""
+    tightness: Tightnesses = (1.0,)
+    """Factor on the majorant: 1 is tight, below 1 it no longer bounds."""
+    tracker: Trackers
+    """How distances are sampled or transmittance is estimated."""
+    lanes: Lanes = ("auto",)
+    """Paths that a work-item follows at once; auto is the device's vector width."""
+    arithmetic: Arithmetics = ("strict",)
+    """strict float, fast (-cl-fast-relaxed-math) or double."""
+
+
+AXES = tuple(Matrix.model_fields)
+
+
+class Entry(Model):
+    """Values for some of the axes."""
+
+    @model_validator(mode="after")
+    def _some(self) -> "Entry":
+        if not self.model_fields_set:
+            raise expected("at least one axis", {})
+        return self
+
+    @model_serializer(mode="wrap")
+    def _as_written(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        return {name: value for name, value in handler(self).items() if value is not None}
+
+    def axes(self) -> dict[str, tuple[Any, ...]]:
+        """Return the axes that the entry names and their values."""
+        return {name: getattr(self, name) for name in AXES if name in self.model_fields_set}
+
+
+class Include(Entry):
+    """Cases to add: the product of these axes, and of the matrix's for those left out."""
+
+    estimand: Estimands = Field(None)
+    medium: Media = Field(None)
+    majorant: Majorants = Field(None)
+    tightness: Tightnesses = Field(None)
+    tracker: Trackers = Field(None)
+    lanes: Lanes = Field(None)
+    arithmetic: Arithmetics = Field(None)
+
+
+class Exclude(Entry):
+    """Cases of the matrix to remove: those that match each of these axes.
+
+    A bare kind matches whatever its parameters, a mapping the parameters that it gives.
+    """
+
+    estimand: Estimands = Field(None)
+    medium: Annotated[tuple[MediumPattern, ...], OneOrMore()] = Field(None)
+    majorant: Annotated[tuple[MajorantPattern, ...], OneOrMore()] = Field(None)
+    tightness: Tightnesses = Field(None)
+    tracker: Annotated[tuple[TrackerPattern, ...], OneOrMore()] = Field(None)
+    lanes: Lanes = Field(None)
+    arithmetic: Arithmetics = Field(None)
+
+
+class Stop(Model):
+    """When a case has been measured well enough: both precisions reached, or the time is up."""
+
+    error: Fraction = 0.01
+    """Relative standard error of the estimate."""
+    time_noise: Fraction = 0.02
+    """Relative half-width of the confidence interval of the time."""
+    at_most: Annotated[float, Number("time", above=0)] = 10.0
+    """Seconds of measuring for one case."""
+    samples: Annotated[int, Number("count", minimum=1)] | None = None
+    """Exactly so many samples for each ray, instead of the rules above."""
+
+
+class Config(Model):
+    """A sweep."""
+
+    name: Annotated[str, NAME]
+    """Names the result folder."""
+    description: Annotated[str, Text()] | None = None
+    """What the sweep shows."""
+    seed: Seed = 1
+    """Seed of all random numbers."""
+    rays: Annotated[Kind, OneOf("rays", RAYS)] = Orthographic()
+    """The rays that every case is measured on."""
+    matrix: Matrix
+    """The axes."""
+    include: Annotated[tuple[Include, ...], OneOrMore(optional=True)] = ()
+    """Cases to add, after exclude."""
+    exclude: Annotated[tuple[Exclude, ...], OneOrMore(optional=True)] = ()
+    """Cases to remove from the matrix."""
+    stop: Stop = Stop()
+    """When to stop measuring a case."""
+
+    _document: Document | None = PrivateAttr(None)
+    _overridden: frozenset[str] = PrivateAttr(frozenset())
+
+    def attach(self, document: Document, overridden: frozenset[str]) -> None:
+        """Remember the text the config was loaded from, and the axes that were replaced in it."""
+        self._document, self._overridden = document, overridden
+
+    @property
+    def path(self) -> Path | None:
+        """The file it was loaded from; None for one made in a program."""
+        return Path(self._document.name) if self._document else None
+
+    @property
+    def text(self) -> str:
+        """The text it was loaded from, comments included; '' for one made in a program."""
+        return self._document.text if self._document else ""
+
+    @property
+    def overridden(self) -> frozenset[str]:
+        """The axes that overrides have replaced."""
+        return self._overridden
+
+    def problem(self, location: Location, message: str) -> Problem:
+        """Return a problem with the position that a location has in the config's text."""
+        if self._document:
+            return self._document.problem(location, message)
+        return Problem("config", 0, 0, path_text(location), message)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return everything with its defaults, fit for JSON and to be loaded again."""
+        return self.model_dump(mode="json")

@@ -1,0 +1,45 @@
+"""A small catalog of made-up trackers, so that tests of configs do not depend on the kernels."""
+
+import pytest
+from freepath import catalog
+
+SMALL_TRACKERS = {
+    "exact": "estimands: [transmittance, free_path]\nneeds: [closed_form]",
+    "cells": "estimands: [transmittance]\nneeds: [cells]",
+    "delta": "estimands: [transmittance, free_path]\nneeds: [majorant]\nbounding: true",
+    "march": (
+        "estimands: [transmittance, free_path]\n"
+        "unbiased: false\n"
+        "parameters:\n"
+        "  step: {unit: length, default: 0.01, above: 0, meaning: length of a step}\n"
+        "  placement: {choices: [start, midpoint, jittered], default: midpoint}\n"
+        "  order: {unit: count, default: 1, minimum: 1, maximum: 3}"
+    ),
+}
+
+
+def tracker_text(front: str, title: str = "A tracker") -> str:
+    """Return the text of a tracker's file with this front matter."""
+    return f"/*---\ntitle: {title}\n{front}\n---*/\nstatic void step(void) {{}}\n"
+
+
+@pytest.fixture(scope="session")
+def small_catalog(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("trackers")
+    for name, front in SMALL_TRACKERS.items():
+        (folder / f"{name}.cl").write_text(tracker_text(front))
+    return catalog.load([folder], builtin=False)
+
+
+@pytest.fixture
+def load_text(tmp_path, monkeypatch, small_catalog):
+    """Load a config from its text, as the file x.yaml of the working directory."""
+    from freepath import config
+
+    monkeypatch.chdir(tmp_path)
+
+    def load(text, overrides=()):
+        (tmp_path / "x.yaml").write_text(text)
+        return config.load("x.yaml", small_catalog.parameter_models(), overrides)
+
+    return load
