@@ -1,0 +1,1 @@
+"""OpenCL C sources, composed at run time (see README.md beside this file)."""

@@ -1,0 +1,92 @@
+/*---
+title: The cells between the voxel centres of a trilinear grid
+uses: [walk/dda, math/newton]
+---*/
+/* Between eight voxel centres the extinction along a ray is a cubic of the distance, so its optical depth
+   is a quartic, exactly. The planes lie at i + 1/2. */
+typedef struct {
+    real c0, c1, c2, c3;
+} Cell;
+
+static void cells_begin(Path *path, const Scene *scene)
+{
+    index cell;
+    State *walk = &path->state;
+    dda_axis(path->origin_x + (SCALAR)0.5, path->direction_x, scene->medium.nx + 1, &cell, &walk->first_x, &walk->delta_x);
+    dda_axis(path->origin_y + (SCALAR)0.5, path->direction_y, scene->medium.ny + 1, &cell, &walk->first_y, &walk->delta_y);
+    dda_axis(path->origin_z + (SCALAR)0.5, path->direction_z, scene->medium.nz + 1, &cell, &walk->first_z, &walk->delta_z);
+    dda_begin(path);
+}
+
+static real cell_exit(const Path *path, const Scene *scene)
+{
+    const real plane = dda_plane(path);
+    return smaller(plane, path->length);
+}
+
+/* Along one axis: the voxel below, where in its interval the path enters, and how fast it moves there.
+   Beyond the outermost centres nothing changes along the axis. */
+static index cell_axis(const real origin, const real direction, const real t_enter, const real t_middle,
+                       const SCALAR voxels, real *start, real *speed)
+{
+    const real middle = origin + t_middle * direction - (SCALAR)0.5;
+    const index below = voxel_below(middle, voxels);
+    const mask outside = less(middle, (real)0) | less((real)(voxels - 1), middle);
+    *start = saturate(origin + t_enter * direction - (SCALAR)0.5 - to_real(below));
+    *start = choose(outside, saturate(middle - to_real(below)), *start);
+    *speed = choose(outside, (real)0, direction);
+    return below;
+}
+
+static Cell cell_between(Path *path, const Scene *scene, const real t_enter, const real t_exit, const mask here)
+{
+    count(path->lookups, here);
+    const real middle = (SCALAR)0.5 * (t_enter + t_exit);
+    real x, y, z, dx, dy, dz;
+    const index i = cell_axis(path->origin_x, path->direction_x, t_enter, middle, scene->medium.nx, &x, &dx);
+    const index j = cell_axis(path->origin_y, path->direction_y, t_enter, middle, scene->medium.ny, &y, &dy);
+    const index k = cell_axis(path->origin_z, path->direction_z, t_enter, middle, scene->medium.nz, &z, &dz);
+    const INTEGER row = (INTEGER)scene->medium.nx, slice = row * (INTEGER)scene->medium.ny;
+    const index voxel = k * slice + j * row + i;
+    /* Interpolation along x gives lines, along y quadratics, along z the cubic. */
+    real quadratic[2][3];
+    for (int upper = 0; upper < 2; ++upper) {
+        __global const float *at = scene->medium_data + upper * slice;
+        const real a = gather(at, voxel), rise_a = gather(at + 1, voxel) - a;
+        const real b = gather(at + row, voxel), rise_b = gather(at + row + 1, voxel) - b;
+        const real line_0 = a + x * rise_a, line_1 = dx * rise_a;
+        const real gap_0 = b + x * rise_b - line_0, gap_1 = dx * rise_b - line_1;
+        quadratic[upper][0] = line_0 + y * gap_0;
+        quadratic[upper][1] = line_1 + y * gap_1 + dy * gap_0;
+        quadratic[upper][2] = dy * gap_1;
+    }
+    const real gap_0 = quadratic[1][0] - quadratic[0][0];
+    const real gap_1 = quadratic[1][1] - quadratic[0][1];
+    const real gap_2 = quadratic[1][2] - quadratic[0][2];
+    Cell cell;
+    cell.c0 = quadratic[0][0] + z * gap_0;
+    cell.c1 = quadratic[0][1] + z * gap_1 + dz * gap_0;
+    cell.c2 = quadratic[0][2] + z * gap_2 + dz * gap_1;
+    cell.c3 = dz * gap_2;
+    return cell;
+}
+
+static real cell_depth(const Cell cell, const real s)
+{
+    const real third = (SCALAR)1 / (SCALAR)3;
+    return s * (cell.c0 + s * ((SCALAR)0.5 * cell.c1 + s * (third * cell.c2 + s * ((SCALAR)0.25 * cell.c3))));
+}
+
+static real cell_distance(const Cell cell, const real depth, const real length)
+{
+    Bracket bracket = {(real)0, length, length * depth / cell_depth(cell, length)};
+    for (int i = 0; i < NEWTON_STEPS; ++i) {
+        const real s = bracket.at;
+        const real sigma = cell.c0 + s * (cell.c1 + s * (cell.c2 + s * cell.c3));
+        if (!any_lane(newton(&bracket, cell_depth(cell, s) - depth, sigma)))
+            break;
+    }
+    return bracket.at;
+}
+
+static void cell_cross(Path *path, const mask where) { dda_cross(path, path->t, where); }

@@ -1,0 +1,36 @@
+/*---
+title: The layers of a stack
+uses: [cells/constant]
+state:
+  layer: index
+  upwards: index
+---*/
+static void cells_begin(Path *path, const Scene *scene)
+{
+    path->state.layer = layer_at(scene, path->origin_z);
+    path->state.upwards = choose(less((real)0, path->direction_z), (index)1, (index)0);
+}
+
+static real cell_exit(const Path *path, const Scene *scene)
+{
+    const mask flat = equal(path->direction_z, (real)0);
+    const index boundary = clamp(path->state.layer + path->state.upwards, (index)0, (index)(INTEGER)scene->medium.layers);
+    const real z = gather(scene->medium_data + (int)scene->medium.layers, boundary);
+    const real t = (z - path->origin_z) / choose(flat, (real)1, path->direction_z);
+    const real forward = larger(t, path->t);
+    return choose(flat | less(path->length, forward), path->length, forward);
+}
+
+static Cell cell_between(Path *path, const Scene *scene, const real t_enter, const real t_exit, const mask here)
+{
+    count(path->lookups, here);
+    const index layer = clamp(path->state.layer, (index)0, (index)((INTEGER)scene->medium.layers - 1));
+    const Cell cell = {gather(scene->medium_data, layer)};
+    return cell;
+}
+
+static void cell_cross(Path *path, const mask where)
+{
+    count(path->crossings, where);
+    path->state.layer += where & (path->state.upwards * 2 - 1);
+}

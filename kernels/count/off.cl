@@ -1,0 +1,2 @@
+/* Nothing is counted while time is measured. */
+#define count(counter, where) ((void)0)
