@@ -1,0 +1,52 @@
+"""The machine and the versions that a result came from."""
+
+from __future__ import annotations
+
+import os
+import platform
+from importlib import metadata
+from typing import Any
+
+import psutil
+
+from freepath.version import __version__
+
+PACKAGES = ("numpy", "scipy", "pyopencl", "OpenImageIO", "pocl-binary-distribution")
+VARIABLES = ("POCL_", "OCL_", "OPENCL_", "RUSTICL_", "PYOPENCL_", "CL_")
+
+
+def processor() -> str:
+    """The CPU's name, as the system gives it."""
+    try:
+        with open("/proc/cpuinfo", encoding="utf-8") as file:
+            names = [line.split(":", 1)[1].strip() for line in file if line.startswith("model name")]
+    except OSError:
+        names = []
+    return names[0] if names else platform.processor() or platform.machine()
+
+
+def load() -> float:
+    """Runnable processes, averaged over the last minute; above the number of cores timings suffer."""
+    return round(psutil.getloadavg()[0], 2)
+
+
+def _version(package: str) -> str | None:
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return None
+
+
+def describe() -> dict[str, Any]:
+    """Host and versions, fit for JSON."""
+    return {
+        "freepath": __version__,
+        "python": platform.python_version(),
+        "packages": {name: version for name in PACKAGES if (version := _version(name))},
+        "system": f"{platform.system()} {platform.release()}",
+        "processor": processor(),
+        "cores": os.cpu_count(),
+        "memory_bytes": psutil.virtual_memory().total,
+        "load_at_start": load(),
+        "variables": {k: v for k, v in sorted(os.environ.items()) if k.startswith(VARIABLES)},
+    }

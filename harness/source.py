@@ -1,0 +1,189 @@
+"""Composes the OpenCL C of a case from the files that it needs, and from no other."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from freepath import kernel_files
+from freepath.kernel_files import KernelFile
+
+SCALARS = {"strict": "float", "fast": "float", "double": "double"}
+BUILD_OPTIONS = {
+    "strict": ("-cl-single-precision-constant",),
+    "fast": ("-cl-single-precision-constant", "-cl-fast-relaxed-math"),
+    "double": (),
+}
+BOX = ("extent_x", "extent_y", "extent_z")
+
+
+@dataclass(frozen=True)
+class Structure:
+    """All that decides which source a case has; numbers are kernel arguments and do not."""
+
+    tracker: str
+    tracker_code: str
+    needs: frozenset[str]
+    tracker_numbers: tuple[str, ...]
+    choices: tuple[tuple[str, str, tuple[str, ...]], ...]
+    """(parameter, what was chosen, all that can be chosen), each a define of the tracker."""
+    estimand: str
+    medium: str
+    medium_numbers: tuple[str, ...]
+    majorant: str | None
+    majorant_numbers: tuple[str, ...]
+    lanes: int
+    arithmetic: str
+    tracker_state: tuple[tuple[str, str], ...] = ()
+    logarithm: str = "polynomial"
+    count: bool = False
+    record: bool = False
+
+
+@dataclass(frozen=True)
+class Source:
+    """Composed OpenCL C, the options to build it with, and a hash of both."""
+
+    text: str
+    options: tuple[str, ...]
+
+    @property
+    def sha256(self) -> str:
+        """Identifies the source and its options."""
+        return combined_hash(self.text, *self.options)
+
+
+def combined_hash(*parts: str | bytes) -> str:
+    """Sha256 over several texts or arrays' bytes, in hexadecimal."""
+    digest = hashlib.sha256()
+    for part in parts:
+        digest.update(hashlib.sha256(part.encode() if isinstance(part, str) else part).digest())
+    return digest.hexdigest()
+
+
+def compose(structure: Structure) -> Source:
+    """Concatenate the files of a case, each behind a `#line` that names it to the compiler."""
+    parts = [_defines(structure)]
+    parts += _named(_kernel(name) for name in _before_structs(structure))
+    walks = _with_uses(_walks(structure))
+    parts.append(_structs(structure, walks))
+    middle = [f"estimands/{structure.estimand}", "count/on" if structure.count else "count/off"]
+    middle += [f"medium/{structure.medium}", "lanes/path"]
+    parts += _named(_kernel(name) for name in middle)
+    parts += _named(walks)
+    parts += _named([KernelFile(f"trackers/{structure.tracker}.cl", structure.tracker_code)])
+    record = "record/samples" if structure.record else "record/nothing"
+    parts += _named(_kernel(name) for name in ("lanes/tally", record, "main"))
+    return Source("\n".join(parts), BUILD_OPTIONS[structure.arithmetic])
+
+
+def _kernel(name: str) -> KernelFile:
+    return kernel_files.read(name)
+
+
+def _before_structs(structure: Structure) -> list[str]:
+    lanes = "lanes/scalar" if structure.lanes == 1 else "lanes/vector"
+    exact = structure.arithmetic == "double" or structure.logarithm == "builtin"
+    logarithm = "math/log_builtin" if exact else "math/log_polynomial"
+    return [lanes, "lanes/common", logarithm, "lanes/rng"]
+
+
+def _walks(structure: Structure) -> list[str]:
+    walks = []
+    if "majorant" in structure.needs:
+        walks.append(f"majorant/{structure.majorant}")
+    walks += [f"{need}/{structure.medium}" for need in ("closed_form", "cells") if need in structure.needs]
+    return walks
+
+
+def _with_uses(names: Iterable[str]) -> list[KernelFile]:
+    """The files and, before each, those that it uses, each once."""
+    found: dict[str, KernelFile] = {}
+
+    def add(name: str) -> None:
+        if name not in found:
+            file = _kernel(name)
+            for used in file.uses:
+                add(used)
+            found[name] = file
+
+    for name in names:
+        add(name)
+    return list(found.values())
+
+
+def _named(files: Iterable[KernelFile]) -> list[str]:
+    return [f'#line 1 "{file.name}"\n{_without_blank_head(file.code)}' for file in files]
+
+
+def _without_blank_head(code: str) -> str:
+    """Leave out the empty lines that stand for front matter, by starting at a later line."""
+    head = re.match(r"\n*", code).group()
+    return code if not head else f"#line {len(head) + 1}\n{code[len(head) :]}"
+
+
+def _defines(structure: Structure) -> str:
+    scalar = SCALARS[structure.arithmetic]
+    double = scalar == "double"
+    lines = [
+        f"#define LANES {structure.lanes}",
+        f"#define SCALAR {scalar}",
+        f"#define INTEGER {'long' if double else 'int'}",
+        f"#define ROUNDING {'2.220446049250313e-16' if double else '1.1920929e-7f'}",
+    ]
+    if double:
+        lines.insert(0, "#pragma OPENCL EXTENSION cl_khr_fp64 : enable")
+    for parameter, chosen, choices in structure.choices:
+        name = parameter.upper()
+        lines += [f"#define {name}_{choice.upper()} {i}" for i, choice in enumerate(choices)]
+        lines.append(f"#define {name} {name}_{chosen.upper()}")
+    return "\n".join(lines)
+
+
+def _structs(structure: Structure, walks: list[KernelFile]) -> str:
+    """Declare Numbers and Scene from the numbers of the parts, State from the files' front matter."""
+    groups = {
+        "box": BOX,
+        "medium": structure.medium_numbers,
+        "majorant": structure.majorant_numbers if "majorant" in structure.needs else (),
+        "tracker": structure.tracker_numbers,
+    }
+    groups = {group: names for group, names in groups.items() if names}
+    lines = ['#line 1 "structs"']
+    for group, names in groups.items():
+        lines.append(f"typedef struct {{ SCALAR {', '.join(names)}; }} {group.capitalize()}Numbers;")
+    members = " ".join(f"{group.capitalize()}Numbers {group};" for group in groups)
+    lines.append(f"typedef struct {{ {members} }} Numbers;")
+    pointers = "__global const float *medium_data; __global const float *majorant_data;"
+    lines.append(f"typedef struct {{ {members} {pointers} }} Scene;")
+    fields = "".join(f"numbers->{group}, " for group in groups)
+    lines += [
+        "static Scene make_scene(__constant const Numbers *numbers, __global const float *medium_data,",
+        "                        __global const float *majorant_data)",
+        "{",
+        f"    const Scene scene = {{{fields}medium_data, majorant_data}};",
+        "    return scene;",
+        "}",
+    ]
+    return "\n".join(lines + _state(structure, walks))
+
+
+def _state(structure: Structure, walks: list[KernelFile]) -> list[str]:
+    state = {name: kind for file in walks for name, kind in file.state.items()}
+    state.update(structure.tracker_state)
+    fields = state or {"unused": "index"}
+    lines = ["typedef struct {"]
+    lines += [f"    {kind} {name};" for name, kind in fields.items()]
+    lines += ["} State;", "static void merge_state(State *into, const State *from, const mask where)", "{"]
+    lines += [f"    into->{name} = choose(where, from->{name}, into->{name});" for name in state]
+    return [*lines, "}"]
+
+
+def numbers_of(structure: Structure, box, medium: dict, majorant: dict, tracker: dict) -> list[float]:
+    """The values of the kernel's Numbers, in the order in which compose declares them."""
+    values = [*box, *(medium[name] for name in structure.medium_numbers)]
+    if "majorant" in structure.needs:
+        values += [majorant[name] for name in structure.majorant_numbers]
+    return values + [tracker[name] for name in structure.tracker_numbers]
