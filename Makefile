@@ -1,0 +1,39 @@
+# make sweep   sets everything up in .venv and runs the first sweep
+# make test    sets up what the tests need and runs them all
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+
+.PHONY: sweep test lint schema clean
+
+sweep: $(VENV)/installed
+	$(BIN)/freepath run quick
+
+test: $(VENV)/installed-for-tests
+	$(BIN)/python -m pytest
+
+lint: $(VENV)/installed-for-tests
+	$(BIN)/ruff check harness tests
+	$(BIN)/ruff format --check harness tests
+
+schema: $(VENV)/installed
+	$(BIN)/python -m freepath.catalog configs/schema.json
+
+# Debian's python3 has venv only with the package python3-venv, whose installation takes root;
+# virtualenv does the same from the package index.
+$(BIN)/python:
+	$(PYTHON) -m venv $(VENV) || ( \
+	  rm -rf $(VENV) && \
+	  $(PYTHON) -m pip install --quiet --target $(VENV)-maker virtualenv && \
+	  PYTHONPATH=$(VENV)-maker $(PYTHON) -m virtualenv --quiet $(VENV) )
+
+$(VENV)/installed: $(BIN)/python setup.cfg pyproject.toml
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[pocl,report]'
+	touch $@
+
+$(VENV)/installed-for-tests: $(VENV)/installed
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test]'
+	touch $@
+
+clean:
+	rm -rf $(VENV) $(VENV)-maker build dist *.egg-info
