@@ -7,7 +7,7 @@ import importlib.resources
 import json
 import re
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
@@ -15,6 +15,7 @@ from typing import Annotated, Any
 from freepath.config.base import Kind, Model
 from freepath.config.document import Document
 from freepath.config.loading import read_text
+from freepath.config.models import MAJORANTS
 from freepath.config.quantity import UNITS, Number
 from freepath.config.rules import Choice, Flag, OneOrMore, Rule, Text, expected, failure
 from freepath.config.schema import json_schema
@@ -22,7 +23,8 @@ from freepath.config.sweep import ESTIMANDS
 from freepath.errors import CatalogError, ConfigError, Problem
 from pydantic import ValidationInfo, create_model, field_validator
 
-NEEDS = ("majorant", "closed_form", "cells")
+NEEDS = ("majorant", "control", "closed_form", "cells")
+STATE = re.compile(r"(real|mask|index)(\[[1-9][0-9]?\])?")
 FRONT_MATTER = re.compile(r"\A\s*/\*---[ \t]*\n(.*?)^[ \t]*---\*/", re.DOTALL | re.MULTILINE)
 IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 # fmt: off
@@ -48,6 +50,8 @@ class Parameter(Model):
     below: Bound = None
     choices: Annotated[tuple[Any, ...], OneOrMore()] | None = None
     meaning: Annotated[str, Text()] | None = None
+    host: Annotated[bool, Flag()] = False
+    """Read by the host alone, when it makes majorants and controls; kernels do not see it."""
     default: Any
 
     @field_validator("choices", mode="after")
@@ -87,10 +91,24 @@ class FrontMatter(Model):
     estimands: Annotated[tuple[Annotated[str, Choice(ESTIMANDS)], ...], OneOrMore()]
     needs: Annotated[tuple[Annotated[str, Choice(NEEDS)], ...], OneOrMore(optional=True)] = ()
     channels: Annotated[int, Number("count", minimum=1)] = 1
-    bounding: Annotated[bool, Flag()] = False
+    majorants: Annotated[tuple[Annotated[str, Choice(tuple(MAJORANTS))], ...], OneOrMore()] = tuple(
+        MAJORANTS
+    )
+    bounding: bool | dict[str, tuple[Any, ...]] = False
     unbiased: Annotated[bool, Flag()] = True
+    state: dict[str, str] = {}
     parameters: dict[str, Parameter] = {}
     citation: Annotated[str, Text()] | None = None
+
+    @field_validator("state", mode="after")
+    @classmethod
+    def _fields(cls, state: dict[str, str]) -> dict[str, str]:
+        for name, kind in state.items():
+            if not is_identifier(name):
+                raise failure(f"expected a C identifier as the field's name, got '{name}'")
+            if not STATE.fullmatch(kind):
+                raise expected("real, mask or index, or an array such as real[8]", kind)
+        return state
 
     @field_validator("parameters", mode="before")
     @classmethod
@@ -116,11 +134,20 @@ class Tracker:
     estimands: tuple[str, ...]
     needs: frozenset[str]
     channels: int
-    bounding: bool
+    majorants: tuple[str, ...]
+    bounding: bool | dict[str, tuple[Any, ...]]
+    """Whether it is only right where the majorant bounds; or for which choices of a parameter."""
     unbiased: bool
+    state: dict[str, str]
     parameters: dict[str, Parameter]
     citation: str
     model: type[Kind] = field(repr=False)
+
+    def needs_bound(self, params: Mapping[str, Any]) -> bool:
+        """Tell whether it is only right where the majorant bounds, with these parameters."""
+        if isinstance(self.bounding, bool):
+            return self.bounding
+        return any(params[name] in values for name, values in self.bounding.items())
 
 
 @dataclass(frozen=True)
@@ -201,7 +228,9 @@ def read(file: Path) -> Tracker:
         estimands=front.estimands,
         needs=frozenset(front.needs),
         channels=front.channels,
+        majorants=front.majorants,
         bounding=front.bounding,
+        state=front.state,
         unbiased=front.unbiased,
         parameters=front.parameters,
         citation=front.citation or "",

@@ -26,13 +26,20 @@ def trackers(catalog: Catalog) -> list[dict[str, Any]]:
             "estimands": ", ".join(tracker.estimands),
             "needs": ", ".join(sorted(tracker.needs)) or "nothing",
             "channels": tracker.channels,
-            "majorant must bound": tracker.bounding,
+            "majorant must bound": bounding(tracker.bounding),
             "unbiased": tracker.unbiased,
             "parameters": "\n".join(parameter(*item) for item in tracker.parameters.items()),
             "citation": tracker.citation,
         }
         for tracker in catalog.trackers.values()
     ]
+
+
+def bounding(value: bool | dict[str, tuple]) -> bool | str:
+    """Whether the majorant must bound, or for which choices."""
+    if isinstance(value, bool):
+        return value
+    return "; ".join(f"{name}: {', '.join(map(str, given))}" for name, given in value.items())
 
 
 def parameter(name: str, given: Parameter) -> str:

@@ -175,7 +175,10 @@ def _skip_reason(tracker: Tracker, point: Point) -> str:
     reasons = []
     if point["estimand"] not in tracker.estimands:
         reasons.append(f"{tracker.name} does not estimate {point['estimand']}")
-    for need in sorted(tracker.needs - {"majorant"} - point["medium"].OFFERS):
+    majorant = point["majorant"]
+    if majorant and majorant.kind not in tracker.majorants:
+        reasons.append(f"{tracker.name} does not work with a majorant {majorant.kind}")
+    for need in sorted(tracker.needs - {"majorant", "control"} - point["medium"].OFFERS):
         what = need.replace("_", " ")
         reasons.append(f"{tracker.name} needs {what}, which {point['medium'].kind} does not offer")
     return "; ".join(reasons)

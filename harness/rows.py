@@ -121,7 +121,8 @@ def verdict(tracker: Tracker, row: dict[str, Any], result: Accuracy) -> tuple[st
     """Status and reason of a measured row."""
     if row["nonfinite"] or not math.isfinite(result.estimate):
         return "invalid", f"{row['nonfinite']} scores are infinite or not a number"
-    claims = tracker.unbiased and not row["truncated"] and not (tracker.bounding and row["violations"])
+    bound = tracker.needs_bound(json.loads(row["params"]))
+    claims = tracker.unbiased and not row["truncated"] and not (bound and row["violations"])
     if not claims:
         return "ok", ""
     if result.z_score is not None and abs(result.z_score) > MISMATCH_Z:

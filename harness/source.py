@@ -93,7 +93,8 @@ def _before_structs(structure: Structure) -> list[str]:
 def _walks(structure: Structure) -> list[str]:
     walks = []
     if "majorant" in structure.needs:
-        walks.append(f"majorant/{structure.majorant}")
+        walk = "control" if "control" in structure.needs else "majorant"
+        walks.append(f"{walk}/{structure.majorant}")
     walks += [f"{need}/{structure.medium}" for need in ("closed_form", "cells") if need in structure.needs]
     return walks
 
@@ -173,11 +174,14 @@ def _structs(structure: Structure, walks: list[KernelFile]) -> str:
 def _state(structure: Structure, walks: list[KernelFile]) -> list[str]:
     state = {name: kind for file in walks for name, kind in file.state.items()}
     state.update(structure.tracker_state)
-    fields = state or {"unused": "index"}
     lines = ["typedef struct {"]
-    lines += [f"    {kind} {name};" for name, kind in fields.items()]
+    for name, kind in (state or {"unused": "index"}).items():
+        scalar, bracket, count = kind.partition("[")
+        lines.append(f"    {scalar} {name}{bracket}{count};")
     lines += ["} State;", "static void merge_state(State *into, const State *from, const mask where)", "{"]
-    lines += [f"    into->{name} = choose(where, from->{name}, into->{name});" for name in state]
+    # Arrays are scratch that a sample fills as it goes: there is nothing to take over at its start.
+    taken = [name for name, kind in state.items() if "[" not in kind]
+    lines += [f"    into->{name} = choose(where, from->{name}, into->{name});" for name in taken]
     return [*lines, "}"]
 
 

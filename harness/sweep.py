@@ -53,22 +53,21 @@ def structure_of(
 ) -> Structure:
     """Decide what the source of a case consists of."""
     tracker = catalog.trackers[case.tracker]
-    front, code = split_front_matter(tracker.source, f"{tracker.name}.cl")
-    parameters = tracker.parameters.items()
+    _, code = split_front_matter(tracker.source, f"{tracker.name}.cl")
+    parameters = [(name, p) for name, p in tracker.parameters.items() if not p.host]
     choices = [(name, p.choices) for name, p in parameters if p.choices is not None]
-    grid = ("nx", "ny", "nz", "cells_per_x", "cells_per_y", "cells_per_z")
     return Structure(
         tracker=tracker.name,
         tracker_code=code,
         needs=tracker.needs,
         tracker_numbers=tuple(name for name, p in parameters if p.choices is None),
-        tracker_state=tuple((front.get("state") or {}).items()),
+        tracker_state=tuple(tracker.state.items()),
         choices=tuple((n, str(case.params[n]), tuple(map(str, given))) for n, given in choices),
         estimand=case.estimand,
         medium=medium.kernel,
         medium_numbers=tuple(medium.numbers),
         majorant=case.majorant.kind if case.majorant else None,
-        majorant_numbers=grid if case.majorant and case.majorant.kind == "grid" else ("sigma_t",),
+        majorant_numbers=majorants.numbers_of(case.majorant, tracker.needs),
         lanes=device.info.lanes if case.lanes == "auto" else int(case.lanes),
         arithmetic=case.arithmetic,
         logarithm=device.info.logarithm,
@@ -81,9 +80,10 @@ def runner_of(
     case: Case, structure: Structure, scene: Scene, program: Program, data: KernelData
 ) -> Runner:
     """Bind a built program to the numbers and the majorant of a case."""
-    majorant = majorants.Majorant("none", {})
+    majorant = majorants.Majorant({})
     if case.majorant:
-        majorant = majorants.build(case.majorant, scene.medium, case.tightness)
+        control = case.params if "control" in structure.needs else None
+        majorant = majorants.build(case.majorant, scene.medium, case.tightness, control)
     medium = scene.medium
     numbers = source.numbers_of(
         structure, medium.extent.tolist(), medium.numbers, majorant.numbers, dict(case.params)

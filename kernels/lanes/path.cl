@@ -10,6 +10,7 @@ typedef struct {
     real majorant;            /* where the path is now */
     real mean_free_path;      /* 1 / majorant, FAR where the majorant is 0 */
     real weight;
+    real collected;           /* deposited so far, beside what the end of the flight will score */
     mask live;                /* -1 while the path goes on */
     mask escaped;             /* -1 once it has left the medium */
     index steps;
@@ -32,6 +33,12 @@ static real sigma_t_at_tentative(Path *path, const Scene *scene, const mask here
     const real sigma = sigma_t(path, scene, path->t, here);
     count(path->violations, here & less(path->majorant * (SCALAR)1.000001, sigma));
     return sigma;
+}
+
+/* Lanes `where` score a part of their weight as if the flight ended at t, and fly on. */
+static void deposit(Path *path, const real weight, const real t, const mask escaped, const mask where)
+{
+    path->collected = choose(where, path->collected + score(weight, t, escaped), path->collected);
 }
 
 /* Lanes `where` have collided: the flight ends at t, inside the medium. */

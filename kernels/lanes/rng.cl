@@ -47,6 +47,10 @@ static Rng stream(const ulong seed, const bits ray, const ulong first, const bit
     return philox(counter, (uint)seed, (uint)(seed >> 32));
 }
 
+/* A stream of its own for a tracker that needs a number beside those of its relatives, so that both still
+   draw the same numbers where they do the same thing. */
+static Rng companion(const Rng *rng) { return philox(*rng, 1u, 0u); }
+
 /* In [0, 1), a multiple of 2^-24: exact in float, and 1 - u is exact too and never 0. */
 static real uniform(Rng *rng) { return to_real(next_bits(rng) >> 8) * (SCALAR)5.9604644775390625e-8; }
 

@@ -24,7 +24,7 @@ static void tally_begin(Tally *tally, Path *path, const mask where)
 
 static void tally_sample(Tally *tally, const Path *path, const mask ended, const mask truncated)
 {
-    const real x = score(path->weight, path->t, path->escaped);
+    const real x = path->collected + score(path->weight, path->t, path->escaped);
     tally->done -= ended;
     tally->steps += ended & path->steps;
     tally->truncated -= truncated;

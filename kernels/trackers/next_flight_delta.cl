@@ -1,0 +1,28 @@
+/*---
+title: Next-flight delta tracking
+estimands: [transmittance]
+needs: [majorant]
+bounding: true
+state:
+  total: real
+citation: >-
+  Cramer 1978, Application of the fictitious scattering model for deep-penetration Monte Carlo
+  calculations; Novak, Georgiev, Hanika, Jarosz 2018, section 4.2
+---*/
+/* Next-flight ratio tracking with the null probability played instead of multiplied: a real collision ends
+   the flight, so that what is behind it costs no lookups. */
+static void begin(Path *path, const Scene *scene, Rng *rng)
+{
+    walk_begin(path, scene);
+    path->weight = (real)0;
+    path->state.total = majorant_depth(path, scene);
+    deposit(path, exp(-path->state.total), path->length, (mask)-1, (mask)-1);
+}
+
+static void step(Path *path, const Scene *scene, Rng *rng)
+{
+    const mask here = next_tentative(path, scene, rng);
+    const real sigma = sigma_t_at_tentative(path, scene, here);
+    collide(path, here & less(uniform(rng) * path->majorant, sigma));
+    deposit(path, exp(path->depth - path->state.total), path->length, (mask)-1, here & path->live);
+}
