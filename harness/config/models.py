@@ -31,6 +31,12 @@ def _not_too_many(resolution: tuple[int, ...]) -> tuple[int, ...]:
     return resolution
 
 
+def _power_of_two(count: int) -> int:
+    if count & (count - 1):
+        raise failure(f"expected a power of two, got {count}")
+    return count
+
+
 Length = Annotated[float, Number("length")]
 Side = Annotated[float, Number("length", above=0)]
 Extinction = Annotated[float, Number("1/length", minimum=0)]
@@ -172,6 +178,8 @@ class Cloud(Medium):
     """Which cloud."""
     sigma_t: Extinction = 1.0
     """Scales the density, whose maximum is 1."""
+    floor: Annotated[float, Number("fraction", minimum=0, maximum=1)] = 0.0
+    """Share of a homogeneous part: the density is floor + (1 - floor) x cloud."""
     interpolation: Interpolation = "trilinear"
     """How the density is read between voxel centres."""
     size: Size = UNIT_CUBE
@@ -207,6 +215,16 @@ class Grid(Kind):
     kind: ClassVar[str] = "grid"
     resolution: CellCounts
     """Cells along each side, one number or three."""
+
+
+class Octree(Kind):
+    """A majorant for each leaf of an octree, which joins cells of like majorants."""
+
+    kind: ClassVar[str] = "octree"
+    resolution: Annotated[int, Number("count", minimum=2, maximum=512), AfterValidator(_power_of_two)]
+    """Finest cells along each side, a power of two."""
+    slack: Annotated[float, Number(minimum=0)] = 0.25
+    """Eight leaves are joined if that raises the integral of the majorant by at most so much."""
 
 
 class Orthographic(Kind):
@@ -271,5 +289,5 @@ def _by_kind(*models: type[Kind]) -> dict[str, type[Kind]]:
 
 
 MEDIA = _by_kind(Homogeneous, Linear, Exponential, Gaussian, Cosine, Layered, Cloud, Volume)
-MAJORANTS = _by_kind(Global, Grid)
+MAJORANTS = _by_kind(Global, Grid, Octree)
 RAYS = _by_kind(Orthographic, Perspective, Chords, Single, File)

@@ -1,0 +1,48 @@
+/*---
+title: Tentative collisions cell by cell
+uses: [walk/cell_by_cell]
+---*/
+/* Every live lane goes on to its next tentative collision or leaves; returns those now at one. path->depth
+   is the majorant's optical depth flown. Lanes that
+   are there wait for the others: in thin media that was 1.4 times as fast as one cell a step. */
+static mask next_tentative(Path *path, const Scene *scene, Rng *rng)
+{
+    const real whole_draw = exponential(rng);
+    real draw = whole_draw;
+    mask walking = path->live;
+    mask here = (mask)0;
+    for (;;) {
+        const real plane = next_plane(path, scene);
+        const mask inside = less(plane, path->length);
+        const real depth = path->majorant * (choose(inside, plane, path->length) - path->t);
+        const mask found = walking & less(draw, depth);
+        const mask crossing = walking & inside & ~found;
+        escape(path, walking & ~inside & ~found);
+        path->t = choose(found, path->t + draw * path->mean_free_path, choose(crossing, plane, path->t));
+        here |= found;
+        walking = crossing;
+        if (!any_lane(walking))
+            break;
+        draw = choose(crossing, draw - depth, draw);
+        enter_next_cell(path, scene, plane, crossing);
+    }    path->depth = choose(here, path->depth + whole_draw, path->depth);
+    return here;
+}
+
+/* The majorant's optical depth of the whole ray, by a walk through all of its cells. */
+static real majorant_depth(Path *path, const Scene *scene)
+{
+    Path probe = *path;
+    mask walking = (mask)-1;
+    real depth = (real)0;
+    while (any_lane(walking)) {
+        const real plane = next_plane(&probe, scene);
+        const real t_exit = smaller(plane, probe.length);
+        depth = choose(walking, depth + probe.majorant * (t_exit - probe.t), depth);
+        probe.t = choose(walking, t_exit, probe.t);
+        walking &= less(plane, probe.length);
+        enter_next_cell(&probe, scene, plane, walking);
+    }
+    path->crossings = probe.crossings;
+    return depth;
+}
