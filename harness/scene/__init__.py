@@ -1,0 +1,9 @@
+"""What is in the scene, in float64: media, rays, and the values that a run should return."""
+
+from freepath.scene.build import build_medium
+from freepath.scene.intersect import segments
+from freepath.scene.medium import Medium
+from freepath.scene.rays import make_rays
+from freepath.scene.references import reference
+
+__all__ = ["Medium", "build_medium", "make_rays", "reference", "segments"]

@@ -1,0 +1,85 @@
+"""Reading densities on voxels, and refusing what is no density."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from freepath.errors import VolumeError
+from freepath.scene.npy import open_npy
+from numpy.typing import NDArray
+
+MOST_VOXELS = 2**31 - 1  # kernels count voxels in 32 bits
+
+
+@dataclass(frozen=True)
+class Volume:
+    """Densities as they are in the file, [z, y, x], and where its voxels are in the world.
+
+    `to_world` (3, 4) is affine and takes voxel units, in which voxel (i, j, k) covers [i, i + 1] x
+    [j, j + 1] x [k, k + 1], to the world.
+    """
+
+    path: Path
+    densities: NDArray
+    to_world: NDArray[np.float64]
+
+
+def read_volume(path: Path, grid: str | None = None) -> Volume:
+    """Read a .npy, a multi-part EXR, a multi-page TIFF or a grid of an OpenVDB file.
+
+    `grid` names the grid of an OpenVDB file; without it, its only grid or the one called
+    `density`. Raises VolumeError, with the file in its message.
+    """
+    suffix = path.suffix.lower()
+    if grid is not None and suffix != ".vdb":
+        raise VolumeError(f"{path}: grid {grid!r}: only OpenVDB files have named grids")
+    if suffix == ".npy":
+        densities, to_world = open_npy(path), np.eye(3, 4)
+        if densities.ndim != 3:
+            found = f"{densities.ndim}, its shape is {densities.shape}"
+            raise VolumeError(f"{path}: expected an array of rank 3 [z, y, x], got rank {found}")
+    elif suffix == ".vdb":
+        from freepath.scene.openvdb import read_openvdb
+
+        densities, to_world = read_openvdb(path, grid)
+    else:
+        from freepath.scene.images import read_slices
+
+        densities, to_world = read_slices(path)
+    if densities.size > MOST_VOXELS:
+        raise VolumeError(f"{path}: {densities.size} voxels, expected at most {MOST_VOXELS}")
+    return Volume(path, densities, to_world)
+
+
+def extinction(densities: NDArray, sigma_t: float, name: str | Path) -> NDArray[np.float32]:
+    """Return densities [z, y, x] times sigma_t, rounded once to float32.
+
+    Raises VolumeError with the first voxel [z, y, x] and the count of each kind where densities
+    are NaN, infinite or negative, or where a product does not fit into float32.
+    """
+    result = np.empty(densities.shape, dtype=np.float32)
+    largest = float(np.finfo(np.float32).max)
+    found: dict[str, list] = {}
+    for z, plane in enumerate(densities):
+        values = np.asarray(plane, dtype=np.float64)
+        with np.errstate(over="ignore", invalid="ignore"):
+            scaled = values * sigma_t
+            result[z] = scaled
+        kinds = {
+            "NaN": np.isnan(values),
+            "infinite": np.isinf(values),
+            "negative": (values < 0.0) & (values > -np.inf),
+            f"too large for float32 once multiplied by sigma_t = {sigma_t:g}": (
+                (np.abs(scaled) > largest) & np.isfinite(values)
+            ),
+        }
+        for kind, wrong in kinds.items():
+            if wrong.any():
+                first = [z, *(int(i) for i in np.argwhere(wrong)[0])]
+                found.setdefault(kind, [0, first])[0] += int(wrong.sum())
+    if found:
+        parts = [f"{count} {kind} (first [z, y, x] = {at})" for kind, (count, at) in found.items()]
+        raise VolumeError(f"{name}: densities that cannot be used: {', '.join(parts)}")
+    return result
