@@ -20,10 +20,12 @@ from freepath.config.rules import Choice, Flag, OneOrMore, Rule, Text, expected,
 from freepath.config.schema import json_schema
 from freepath.config.sweep import ESTIMANDS
 from freepath.errors import CatalogError, ConfigError, Problem
+from freepath.kernel_files import split_front_matter
 from pydantic import ValidationInfo, create_model, field_validator
 
 NEEDS = ("majorant", "closed_form", "cells")
-FRONT_MATTER = re.compile(r"\A\s*/\*---[ \t]*\n(.*?)^[ \t]*---\*/", re.DOTALL | re.MULTILINE)
+STATE_TYPES = ("real", "mask", "index")
+"""What a tracker may keep in its state: types that lanes/main.cl can merge under a mask."""
 IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 # fmt: off
 C_WORDS = frozenset((
@@ -90,28 +92,32 @@ class FrontMatter(Model):
     bounding: Annotated[bool, Flag()] = False
     unbiased: Annotated[bool, Flag()] = True
     parameters: dict[str, Parameter] = {}
+    state: dict[str, Annotated[str, Choice(STATE_TYPES)]] = {}
     citation: Annotated[str, Text()] | None = None
 
-    @field_validator("parameters", mode="before")
+    @field_validator("parameters", "state", mode="before")
     @classmethod
-    def _names(cls, parameters: Any) -> Any:
-        if parameters is None:
+    def _names(cls, fields: Any, info: ValidationInfo) -> Any:
+        if fields is None:
             return {}
-        if not isinstance(parameters, dict):
-            raise expected("a mapping of parameter names", parameters)
-        for name in parameters:
-            if not is_identifier(name) or hasattr(Kind, name):
-                raise failure(f"expected a C identifier as the parameter's name, got '{name}'")
-        return parameters
+        what = "parameter" if info.field_name == "parameters" else "state"
+        if not isinstance(fields, dict):
+            raise expected(f"a mapping of {what} names", fields)
+        for name in fields:
+            if not is_identifier(name) or (what == "parameter" and hasattr(Kind, name)):
+                raise failure(f"expected a C identifier as the {what}'s name, got '{name}'")
+        return fields
 
 
 @dataclass(frozen=True)
 class Tracker:
-    """A tracker: the front matter of its file, and the file's text with it."""
+    """A tracker: the front matter of its file, its code, and the file's whole text."""
 
     name: str
     path: Path
     source: str
+    code: str
+    """The text with empty lines for the front matter: line numbers are those of the file."""
     title: str
     estimands: tuple[str, ...]
     needs: frozenset[str]
@@ -119,6 +125,8 @@ class Tracker:
     bounding: bool
     unbiased: bool
     parameters: dict[str, Parameter]
+    state: dict[str, str]
+    """Fields that a path carries for this tracker: their names and types."""
     citation: str
     model: type[Kind] = field(repr=False)
 
@@ -184,11 +192,9 @@ def read(file: Path) -> Tracker:
     if not is_identifier(file.stem):
         raise _bad(file, f"expected a C identifier as the file's name, got '{file.stem}'")
     source = read_text(file).replace("\r\n", "\n")
-    match = FRONT_MATTER.match(source)
-    if not match:
+    text, code = split_front_matter(source)
+    if text is None:
         raise _bad(file, "expected front matter, /*--- ... ---*/, as the first comment")
-    # empty lines stand for what is before it, so that positions are those in the file
-    text = "\n" * source.count("\n", 0, match.start(1)) + match[1]
     document = Document.parse(str(file), text)
     if document.data is None:
         raise _bad(file, "expected title and estimands in the front matter, got nothing")
@@ -197,6 +203,7 @@ def read(file: Path) -> Tracker:
         name=file.stem,
         path=file,
         source=source,
+        code=code,
         title=front.title,
         estimands=front.estimands,
         needs=frozenset(front.needs),
@@ -204,6 +211,7 @@ def read(file: Path) -> Tracker:
         bounding=front.bounding,
         unbiased=front.unbiased,
         parameters=front.parameters,
+        state=front.state,
         citation=front.citation or "",
         model=_parameter_model(file.stem, front),
     )
