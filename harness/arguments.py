@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 import shtab
-
 from freepath.version import __version__
 
 LISTS = ("trackers", "media", "majorants", "effects", "configs")
@@ -42,12 +42,11 @@ def parser() -> argparse.ArgumentParser:
     _add_run(commands)
     _add_source(commands)
     _add_list(commands)
-    devices = commands.add_parser("devices", help="list the OpenCL devices", allow_abbrev=False)
-    devices.add_argument("--json", action="store_true", help="as JSON")
+    _add_devices(commands)
     return top
 
 
-def _add_run(commands) -> None:
+def _add_run(commands: Any) -> None:
     run = commands.add_parser(
         "run",
         help="run a sweep",
@@ -56,15 +55,7 @@ def _add_run(commands) -> None:
         allow_abbrev=False,
     )
     _add_config(run)
-    run.add_argument(
-        "-d",
-        "--device",
-        action="append",
-        default=[],
-        metavar="DEVICE",
-        help="part of the name, platform or driver of a device, or 'all'; may be repeated "
-        "(default: the first; see `freepath devices`)",
-    )
+    _add_device(run, "part of the name, platform or driver of a device, or 'all'; may be repeated")
     run.add_argument("-N", "--show-only", action="store_true", help="list the cases and stop")
     run.add_argument(
         "-o",
@@ -82,7 +73,7 @@ def _add_run(commands) -> None:
     run.add_argument("--json", action="store_true", help="print the rows as JSON, nothing else")
 
 
-def _add_config(command) -> None:
+def _add_config(command: Any) -> None:
     command.add_argument(
         "config", metavar="CONFIG", help="a YAML file, or the name of a shipped config"
     ).complete = shtab.FILE
@@ -100,7 +91,18 @@ def _add_config(command) -> None:
     _add_trackers(command)
 
 
-def _add_trackers(command) -> None:
+def _add_device(command: Any, what: str) -> None:
+    command.add_argument(
+        "-d",
+        "--device",
+        action="append",
+        default=[],
+        metavar="DEVICE",
+        help=f"{what} (default: the first; see `freepath devices`)",
+    )
+
+
+def _add_trackers(command: Any) -> None:
     command.add_argument(
         "--trackers",
         action="append",
@@ -111,7 +113,7 @@ def _add_trackers(command) -> None:
     ).complete = shtab.DIRECTORY
 
 
-def _add_source(commands) -> None:
+def _add_source(commands: Any) -> None:
     source = commands.add_parser(
         "source",
         help="show the OpenCL C of a case",
@@ -120,14 +122,28 @@ def _add_source(commands) -> None:
     )
     _add_config(source)
     source.add_argument("--case", type=int, metavar="N", help="number of the case in `run -N`")
-    source.add_argument("-d", "--device", action="append", default=[], metavar="DEVICE",
-                        help="device whose lanes `auto` stands for (default: the first)")
+    _add_device(source, "a device whose lanes `auto` stands for")
 
 
-def _add_list(commands) -> None:
+def _add_list(commands: Any) -> None:
     listing = commands.add_parser(
-        "list", help="list trackers, media, majorants, effects or configs", allow_abbrev=False
+        "list",
+        help="list trackers, media, majorants, effects or configs",
+        description="List what a config may name, and the configs that come with freepath.",
+        allow_abbrev=False,
     )
-    listing.add_argument("what", nargs="?", choices=LISTS, default="trackers")
+    listing.add_argument(
+        "what", nargs="?", choices=LISTS, default=LISTS[0], help="trackers if none"
+    )
     listing.add_argument("--json", action="store_true", help="as JSON")
     _add_trackers(listing)
+
+
+def _add_devices(commands: Any) -> None:
+    devices = commands.add_parser(
+        "devices",
+        help="list the OpenCL devices",
+        description="List the OpenCL devices; -d of the other commands takes part of a name.",
+        allow_abbrev=False,
+    )
+    devices.add_argument("--json", action="store_true", help="as JSON")

@@ -7,7 +7,7 @@ import importlib.resources
 import json
 import re
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
@@ -21,11 +21,13 @@ from freepath.config.rules import Choice, Flag, OneOrMore, Rule, Text, expected,
 from freepath.config.schema import json_schema
 from freepath.config.sweep import ESTIMANDS
 from freepath.errors import CatalogError, ConfigError, Problem
+from freepath.kernel_files import split_front_matter
 from pydantic import ValidationInfo, create_model, field_validator
 
 NEEDS = ("majorant", "control", "closed_form", "cells")
-STATE = re.compile(r"(real|mask|index)(\[[1-9][0-9]?\])?")
-FRONT_MATTER = re.compile(r"\A\s*/\*---[ \t]*\n(.*?)^[ \t]*---\*/", re.DOTALL | re.MULTILINE)
+STATE = r"(real|mask|index)(\[[1-9][0-9]?\])?"
+"""What a tracker may keep of a path: types that main.cl can merge under a mask, and arrays of them as
+scratch, which a sample fills before it reads them."""
 IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 # fmt: off
 C_WORDS = frozenset((
@@ -96,40 +98,33 @@ class FrontMatter(Model):
     )
     bounding: bool | dict[str, tuple[Any, ...]] = False
     unbiased: Annotated[bool, Flag()] = True
-    state: dict[str, str] = {}
     parameters: dict[str, Parameter] = {}
+    state: dict[str, Annotated[str, Text("real, mask or index, or an array of them", STATE)]] = {}
     citation: Annotated[str, Text()] | None = None
 
-    @field_validator("state", mode="after")
+    @field_validator("parameters", "state", mode="before")
     @classmethod
-    def _fields(cls, state: dict[str, str]) -> dict[str, str]:
-        for name, kind in state.items():
-            if not is_identifier(name):
-                raise failure(f"expected a C identifier as the field's name, got '{name}'")
-            if not STATE.fullmatch(kind):
-                raise expected("real, mask or index, or an array such as real[8]", kind)
-        return state
-
-    @field_validator("parameters", mode="before")
-    @classmethod
-    def _names(cls, parameters: Any) -> Any:
-        if parameters is None:
+    def _names(cls, fields: Any, info: ValidationInfo) -> Any:
+        if fields is None:
             return {}
-        if not isinstance(parameters, dict):
-            raise expected("a mapping of parameter names", parameters)
-        for name in parameters:
-            if not is_identifier(name) or hasattr(Kind, name):
-                raise failure(f"expected a C identifier as the parameter's name, got '{name}'")
-        return parameters
+        what = "parameter" if info.field_name == "parameters" else "state"
+        if not isinstance(fields, dict):
+            raise expected(f"a mapping of {what} names", fields)
+        for name in fields:
+            if not is_identifier(name) or (what == "parameter" and hasattr(Kind, name)):
+                raise failure(f"expected a C identifier as the {what}'s name, got '{name}'")
+        return fields
 
 
 @dataclass(frozen=True)
 class Tracker:
-    """A tracker: the front matter of its file, and the file's text with it."""
+    """A tracker: the front matter of its file, its code, and the file's whole text."""
 
     name: str
     path: Path
     source: str
+    code: str
+    """The text with empty lines for the front matter: line numbers are those of the file."""
     title: str
     estimands: tuple[str, ...]
     needs: frozenset[str]
@@ -138,16 +133,11 @@ class Tracker:
     bounding: bool | dict[str, tuple[Any, ...]]
     """Whether it is only right where the majorant bounds; or for which choices of a parameter."""
     unbiased: bool
-    state: dict[str, str]
     parameters: dict[str, Parameter]
+    state: dict[str, str]
+    """Fields that a path carries for this tracker: their names and types."""
     citation: str
     model: type[Kind] = field(repr=False)
-
-    def needs_bound(self, params: Mapping[str, Any]) -> bool:
-        """Tell whether it is only right where the majorant bounds, with these parameters."""
-        if isinstance(self.bounding, bool):
-            return self.bounding
-        return any(params[name] in values for name, values in self.bounding.items())
 
 
 @dataclass(frozen=True)
@@ -211,11 +201,9 @@ def read(file: Path) -> Tracker:
     if not is_identifier(file.stem):
         raise _bad(file, f"expected a C identifier as the file's name, got '{file.stem}'")
     source = read_text(file).replace("\r\n", "\n")
-    match = FRONT_MATTER.match(source)
-    if not match:
+    text, code = split_front_matter(source)
+    if text is None:
         raise _bad(file, "expected front matter, /*--- ... ---*/, as the first comment")
-    # empty lines stand for what is before it, so that positions are those in the file
-    text = "\n" * source.count("\n", 0, match.start(1)) + match[1]
     document = Document.parse(str(file), text)
     if document.data is None:
         raise _bad(file, "expected title and estimands in the front matter, got nothing")
@@ -224,15 +212,16 @@ def read(file: Path) -> Tracker:
         name=file.stem,
         path=file,
         source=source,
+        code=code,
         title=front.title,
         estimands=front.estimands,
         needs=frozenset(front.needs),
         channels=front.channels,
         majorants=front.majorants,
         bounding=front.bounding,
-        state=front.state,
         unbiased=front.unbiased,
         parameters=front.parameters,
+        state=front.state,
         citation=front.citation or "",
         model=_parameter_model(file.stem, front),
     )

@@ -5,21 +5,23 @@ from __future__ import annotations
 import os
 import time
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
-
 from freepath.errors import BuildError, DeviceError, RunError
 from freepath.source import SCALARS, Source
 
-# pyopencl's cache of binaries is keyed without the environment that steers a driver's compiler, and on
-# PoCL it compiles a second time; the drivers keep caches of their own.
+# pyopencl's cache of binaries is keyed without the environment that steers a driver's compiler, and
+# on PoCL it compiles a second time; the drivers keep caches of their own.
 os.environ.setdefault("PYOPENCL_NO_CACHE", "1")
 
 import pyopencl as cl  # noqa: E402  (the cache is chosen before the import)
 
 COUNTERS = ("lookups", "crossings", "violations", "steps", "truncated", "nonfinite")
 LANE_COUNTS = (1, 2, 4, 8, 16)
+NO_DEVICE = "no OpenCL device found; `pip install 'freepath[pocl]'` brings one that runs on the CPU"
 
 
 @dataclass(frozen=True)
@@ -27,6 +29,7 @@ class DeviceInfo:
     """What a device says of itself."""
 
     name: str
+    """Several alike on one platform are told apart by a number."""
     platform: str
     driver_version: str
     kind: str
@@ -36,21 +39,25 @@ class DeviceInfo:
     fp64: bool
     timer_resolution_s: float
     logarithm: str
+    slow_compiler: bool
+    """Whether a kernel that is run once is better built without optimisation."""
 
     @property
     def label(self) -> str:
-        """One line for tables."""
+        """One line for messages."""
         return f"{self.name} ({self.platform} {self.driver_version})"
 
 
-def _info(device: cl.Device) -> DeviceInfo:
+def _info(device: cl.Device, number: int = 1) -> DeviceInfo:
     is_cpu = bool(device.type & cl.device_type.CPU)
     width = device.native_vector_width_float
-    pocl = "portable computing language" in device.platform.name.lower()
+    platform = " ".join(device.platform.name.split())
+    pocl = "portable computing language" in platform.lower()
+    name = " ".join(device.name.split())
     return DeviceInfo(
-        name=device.name.strip(),
-        platform=device.platform.name.strip(),
-        driver_version=device.driver_version.strip(),
+        name=name if number == 1 else f"{name} #{number}",
+        platform=platform,
+        driver_version=" ".join(device.driver_version.split()),
         kind="CPU" if is_cpu else "GPU" if device.type & cl.device_type.GPU else "other",
         compute_units=device.max_compute_units,
         lanes=max(n for n in LANE_COUNTS if n <= max(width, 1)) if is_cpu else 1,
@@ -58,81 +65,85 @@ def _info(device: cl.Device) -> DeviceInfo:
         timer_resolution_s=device.profiling_timer_resolution * 1e-9,
         # Measured on PoCL: the polynomial runs 16 lanes at up to 1.7 times the built-in's speed.
         logarithm="polynomial" if pocl else "builtin",
+        slow_compiler=pocl,
     )
 
 
-def _all_devices() -> list[cl.Device]:
+def _all_devices() -> list[tuple[cl.Device, DeviceInfo]]:
+    """Every device of every platform; a platform may have none and then says so by an error."""
     try:
         platforms = cl.get_platforms()
     except cl.Error:
         return []
-    found = []
+    found: list[tuple[cl.Device, DeviceInfo]] = []
     for platform in platforms:
         try:
-            found += platform.get_devices()
+            devices = platform.get_devices()
         except cl.Error:
-            continue  # a platform without devices says so by an error
+            continue
+        for device in devices:
+            first = _info(device)
+            alike = sum(
+                other.platform == first.platform and other.name.partition(" #")[0] == first.name
+                for _, other in found
+            )
+            found.append((device, _info(device, alike + 1)))
     return found
 
 
 def list_devices() -> list[DeviceInfo]:
     """All OpenCL devices of all platforms; empty where there is none."""
-    return [_info(device) for device in _all_devices()]
-
-
-def device_records() -> list[dict]:
-    """What `freepath devices` lists."""
-    return [
-        {
-            "device": info.name,
-            "platform": info.platform,
-            "driver": info.driver_version,
-            "kind": info.kind,
-            "compute units": info.compute_units,
-            "lanes": info.lanes,
-            "double": info.fp64,
-            "timer resolution [ns]": round(info.timer_resolution_s * 1e9),
-        }
-        for info in list_devices()
-    ]
+    return [info for _, info in _all_devices()]
 
 
 def open_devices(selectors: list[str]) -> list[Device]:
     """Open the devices whose name, platform or driver contains a selector; without one, the first.
 
-    Raises DeviceError where there is no device or a selector matches none.
+    Raises DeviceError where there is no device, a selector matches none, or one cannot be opened.
     """
     devices = _all_devices()
     if not devices:
-        raise DeviceError(
-            "no OpenCL device found; `pip install freepath[pocl]` brings one that runs on the CPU"
-        )
+        raise DeviceError(NO_DEVICE)
     if not selectors:
-        return [Device(devices[0])]
-    chosen: list[cl.Device] = []
+        return [Device(*devices[0])]
+    chosen: dict[int, Device] = {}
     for selector in selectors:
-        matching = [d for d in devices if selector == "all" or _matches(d, selector)]
+        matching = [i for i, (_, info) in enumerate(devices) if matches(info, selector)]
         if not matching:
-            names = "\n".join(f"  {_info(device).label}" for device in devices)
-            raise DeviceError(f"no OpenCL device matches {selector!r}; there are\n{names}")
-        chosen += [device for device in matching if device not in chosen]
-    return [Device(device) for device in chosen]
+            names = "\n".join(f"  {info.label}" for _, info in devices)
+            raise DeviceError(f"no OpenCL device matches '{selector}'; there are\n{names}")
+        chosen |= {i: Device(*devices[i]) for i in matching if i not in chosen}
+    return list(chosen.values())
 
 
-def _matches(device: cl.Device, selector: str) -> bool:
-    info = _info(device)
-    return selector.lower() in f"{info.platform} / {info.name} / {info.driver_version}".lower()
+def matches(info: DeviceInfo, selector: str) -> bool:
+    """Tell whether a device's name, platform or driver contains a selector; 'all' fits each."""
+    wanted = " ".join(selector.lower().split())
+    text = f"{info.platform} / {info.name} / {info.driver_version}".lower()
+    return wanted == "all" or (bool(wanted) and wanted in text)
+
+
+@contextmanager
+def run_errors(label: str, what: str) -> Iterator[None]:
+    """Turn what the driver refuses into a RunError that names the device and what was tried."""
+    try:
+        yield
+    except cl.Error as error:
+        raise RunError(f"{label}: {what} failed: {error}") from error
 
 
 class Device:
     """A device with its context and queue; builds kernels and uploads arrays."""
 
-    def __init__(self, device: cl.Device):
-        self.info = _info(device)
+    def __init__(self, device: cl.Device, info: DeviceInfo):
+        self.info = info
         self._device = device
-        self.context = cl.Context([device])
         profiling = cl.command_queue_properties.PROFILING_ENABLE
-        self.queue = cl.CommandQueue(self.context, properties=profiling)
+        try:
+            self.context = cl.Context([device])
+            self.queue = cl.CommandQueue(self.context, properties=profiling)
+        except cl.Error as error:
+            raise DeviceError(f"{info.label}: cannot be opened: {error}") from error
 
     @property
     def work_items(self) -> tuple[int, int]:
@@ -142,11 +153,31 @@ class Device:
         local = min(64, self._device.max_work_group_size)
         return self.info.compute_units * local * 16, local
 
-    def upload(self, array: np.ndarray) -> cl.Buffer:
-        """Copy an array to the device; an empty one becomes a buffer of one element."""
-        array = np.ascontiguousarray(array if array.size else np.zeros(1, array.dtype))
+    def upload(self, array: np.ndarray | None) -> cl.Buffer:
+        """Copy an array to the device; None or an empty one becomes a buffer of one element."""
+        if array is None or not array.size:
+            array = np.zeros(1)
+        array = np.ascontiguousarray(array)
         flags = cl.mem_flags.READ_ONLY | cl.mem_flags.COPY_HOST_PTR
-        return cl.Buffer(self.context, flags, hostbuf=array)
+        with run_errors(self.info.label, f"uploading {array.nbytes} bytes"):
+            return cl.Buffer(self.context, flags, hostbuf=array)
+
+    def allocate(self, size: int) -> cl.Buffer:
+        """Make a buffer of so many bytes."""
+        with run_errors(self.info.label, f"allocating {size} bytes"):
+            return cl.Buffer(self.context, cl.mem_flags.READ_WRITE, size)
+
+    def read(self, buffer: cl.Buffer, shape: tuple[int, ...], dtype: np.dtype | type) -> np.ndarray:
+        """Copy the beginning of a buffer to a new array."""
+        array = np.empty(shape, dtype)
+        with run_errors(self.info.label, f"reading {array.nbytes} bytes"):
+            cl.enqueue_copy(self.queue, array, buffer)
+        return array
+
+    def write(self, buffer: cl.Buffer, array: np.ndarray) -> None:
+        """Copy an array to the beginning of a buffer."""
+        with run_errors(self.info.label, f"writing {array.nbytes} bytes"):
+            cl.enqueue_copy(self.queue, buffer, array)
 
     def build(self, source: Source) -> Program:
         """Compile; raises BuildError with the compiler's log."""
@@ -155,30 +186,32 @@ class Device:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", cl.CompilerWarning)
                 program = cl.Program(self.context, source.text).build(options=list(source.options))
+                kernel = cl.Kernel(program, "track")
         except cl.Error as error:
             raise BuildError(f"{self.info.label} cannot build the kernel:\n{error}") from error
-        return Program(self, program, source, time.perf_counter() - started)
+        return Program(self, kernel, source, time.perf_counter() - started)
 
 
 class Program:
     """A built kernel `track` on its device."""
 
-    def __init__(self, device: Device, program: cl.Program, source: Source, time_build_s: float):
+    def __init__(self, device: Device, kernel: cl.Kernel, source: Source, time_build_s: float):
         self.device = device
         self.source = source
         self.time_build_s = time_build_s
-        self._kernel = cl.Kernel(program, "track")
+        self._kernel = kernel
 
     def launch(self, arguments: list, global_size: int, local_size: int) -> float:
         """Run the kernel to its end; returns event seconds (0 where the driver reports none)."""
-        try:
+        with run_errors(self.device.info.label, "a launch"):
             self._kernel.set_args(*arguments)
             size = (global_size,), (local_size,)
             event = cl.enqueue_nd_range_kernel(self.device.queue, self._kernel, *size)
             event.wait()
-            return (event.profile.end - event.profile.start) * 1e-9
-        except cl.Error as error:
-            raise RunError(f"{self.device.info.label}: a launch failed: {error}") from error
+        try:
+            return max(0, event.profile.end - event.profile.start) * 1e-9
+        except cl.Error:
+            return 0.0
 
 
 def scalar_type(arithmetic: str) -> np.dtype:

@@ -8,7 +8,6 @@ from importlib import metadata
 from typing import Any
 
 import psutil
-
 from freepath.version import __version__
 
 PACKAGES = ("numpy", "scipy", "pyopencl", "OpenImageIO", "pocl-binary-distribution")
@@ -19,14 +18,16 @@ def processor() -> str:
     """The CPU's name, as the system gives it."""
     try:
         with open("/proc/cpuinfo", encoding="utf-8") as file:
-            names = [line.split(":", 1)[1].strip() for line in file if line.startswith("model name")]
+            names = [
+                line.split(":", 1)[1].strip() for line in file if line.startswith("model name")
+            ]
     except OSError:
         names = []
     return names[0] if names else platform.processor() or platform.machine()
 
 
 def load() -> float:
-    """Runnable processes, averaged over the last minute; above the number of cores timings suffer."""
+    """Runnable processes, averaged over a minute; above the number of cores timings suffer."""
     return round(psutil.getloadavg()[0], 2)
 
 

@@ -1,14 +1,22 @@
-"""What `freepath list` and `freepath devices` show, as tables or as JSON."""
+"""What `freepath list` and `freepath devices` show, as text or as JSON."""
 
 from __future__ import annotations
 
-from typing import Any
-
-from rich.table import Table
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
 
 from freepath import config
 from freepath.catalog import Catalog, Parameter
+from freepath.config.document import Document
+from freepath.config.loading import read_text
 from freepath.config.models import MAJORANTS, MEDIA
+from rich.table import Table
+from rich.text import Text
+
+if TYPE_CHECKING:
+    from freepath.device import DeviceInfo
+
+Record = dict[str, Any]
 
 EFFECTS = {
     "absorption": "every medium takes light out of the ray",
@@ -17,7 +25,7 @@ EFFECTS = {
 }
 
 
-def trackers(catalog: Catalog) -> list[dict[str, Any]]:
+def trackers(catalog: Catalog) -> list[Record]:
     """One record a tracker."""
     return [
         {
@@ -26,51 +34,80 @@ def trackers(catalog: Catalog) -> list[dict[str, Any]]:
             "estimands": ", ".join(tracker.estimands),
             "needs": ", ".join(sorted(tracker.needs)) or "nothing",
             "channels": tracker.channels,
-            "majorant must bound": bounding(tracker.bounding),
+            "majorant must bound": _bounding(tracker.bounding),
             "unbiased": tracker.unbiased,
-            "parameters": "\n".join(parameter(*item) for item in tracker.parameters.items()),
+            "parameters": [_parameter(*item) for item in tracker.parameters.items()],
             "citation": tracker.citation,
         }
         for tracker in catalog.trackers.values()
     ]
 
 
-def bounding(value: bool | dict[str, tuple]) -> bool | str:
+def _bounding(value: bool | dict[str, tuple[Any, ...]]) -> bool | str:
     """Whether the majorant must bound, or for which choices."""
     if isinstance(value, bool):
         return value
     return "; ".join(f"{name}: {', '.join(map(str, given))}" for name, given in value.items())
 
 
-def parameter(name: str, given: Parameter) -> str:
-    """A parameter with its default, unit and bounds."""
-    text = f"{name} = {given.default}" + (f" {given.unit}" if given.unit else "")
-    if given.choices is not None:
-        return f"{text} ({' | '.join(map(str, given.choices))})"
-    signs = {"minimum": ">=", "above": ">", "maximum": "<=", "below": "<"}
-    bounds = [f"{sign} {getattr(given, key):g}" for key, sign in signs.items()
-              if getattr(given, key) is not None]
-    return text + (f" ({', '.join(bounds)})" if bounds else "")
+def _parameter(name: str, given: Parameter) -> str:
+    """A parameter with its default, its unit and bounds or its choices, and its meaning."""
+    rule = given.rule().describe()
+    return f"{name} = {_plain(given.default)}: {given.meaning or name} ({rule})"
 
 
-def kinds(models: dict[str, Any], word: str) -> list[dict[str, Any]]:
+def kinds(models: dict[str, Any], word: str) -> list[Record]:
     """One record a kind of medium or majorant."""
+    return [
+        {
+            word: name,
+            "what": model.__doc__,
+            "parameters": [_field(*item) for item in model.model_fields.items()],
+        }
+        for name, model in models.items()
+    ]
+
+
+def _field(name: str, field: Any) -> str:
+    if field.is_required():
+        return f"{name} (required): {field.description}"
+    given = "optional" if field.default is None else _plain(field.default)
+    return f"{name} = {given}: {field.description}"
+
+
+def _plain(value: Any) -> str:
+    if isinstance(value, tuple):
+        return f"[{', '.join(map(_plain, value))}]"
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def configs() -> list[Record]:
+    """One record a shipped config."""
     records = []
-    for name, model in models.items():
-        fields = [
-            key if field.is_required() else f"{key} = {field.default}"
-            for key, field in model.model_fields.items()
-        ]
-        records.append({word: name, "what": model.__doc__, "parameters": ", ".join(fields)})
+    for name, path in config.shipped().items():
+        keys = Document.parse(str(path), read_text(path)).data
+        records.append({"config": name, "what": keys.get("description"), "file": str(path)})
     return records
 
 
-def configs() -> list[dict[str, Any]]:
-    """One record a shipped config."""
-    return [{"config": name, "file": str(path)} for name, path in config.shipped().items()]
+def devices(infos: Iterable[DeviceInfo]) -> list[Record]:
+    """One record a device."""
+    return [
+        {
+            "device": info.name,
+            "platform": info.platform,
+            "driver": info.driver_version,
+            "kind": info.kind,
+            "compute units": info.compute_units,
+            "lanes": info.lanes,
+            "double": info.fp64,
+            "timer resolution [ns]": round(info.timer_resolution_s * 1e9),
+        }
+        for info in infos
+    ]
 
 
-def records_of(what: str, catalog: Catalog) -> list[dict[str, Any]]:
+def records_of(what: str, catalog: Catalog) -> list[Record]:
     """The records of one of arguments.LISTS."""
     if what == "trackers":
         return trackers(catalog)
@@ -83,17 +120,23 @@ def records_of(what: str, catalog: Catalog) -> list[dict[str, Any]]:
     return configs()
 
 
-def table_of(records: list[dict[str, Any]]) -> Table:
-    """A table with a column a key."""
-    table = Table()
-    for key in records[0]:
-        table.add_column(key, overflow="fold")
+def table_of(records: list[Record]) -> Table:
+    """Each record's first value, and beside it the others, a line each with its key."""
+    table = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
+    table.add_column(overflow="fold", max_width=28, style="bold")
+    table.add_column(overflow="fold")
     for record in records:
-        table.add_row(*(_cell(value) for value in record.values()))
+        (_, name), *rest = record.items()
+        lines = [line for key, value in rest for line in _lines(key, value)]
+        table.add_row(Text(name), Text("\n".join(lines)))
     return table
 
 
-def _cell(value: Any) -> str:
+def _lines(key: str, value: Any) -> list[str]:
+    if isinstance(value, list):
+        return [f"  {line}" for line in value]
+    if value is None or value == "":
+        return []
     if isinstance(value, bool):
-        return "yes" if value else "no"
-    return str(value).replace("[", r"\[")
+        value = "yes" if value else "no"
+    return [str(value) if key in ("title", "what", "file", "citation") else f"{key}: {value}"]

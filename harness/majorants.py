@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,12 @@ class Majorant:
 
     numbers: dict[str, float]
     data: np.ndarray | None = None
+    control_excess: float = 0.0
+    """How far the control lies above the extinction at most, relative to the highest extinction."""
+
+
+EXCESS = 1e-6
+"""How far above the extinction a control may be by rounding, relative to the majorant."""
 
 
 @dataclass(frozen=True)
@@ -45,31 +51,46 @@ def numbers_of(model: Any, needs: frozenset[str]) -> tuple[str, ...]:
     return (*counts, *PER_LENGTH, "cells")
 
 
+def cells_of(model: Any) -> tuple[int, int, int]:
+    """The cells (nx, ny, nz) over which a config's majorant bounds the medium."""
+    if model.kind == "octree":
+        return (model.resolution,) * 3
+    return (1, 1, 1) if model.kind == "global" else tuple(model.resolution)
+
+
 def build(
-    model: Any, medium: Medium, tightness: float, control: Mapping[str, Any] | None = None
+    model: Any,
+    medium: Medium,
+    bounds: tuple[np.ndarray, np.ndarray],
+    tightness: float,
+    control: Mapping[str, Any] | None = None,
 ) -> Majorant:
-    """Bound the medium as the config's majorant says, times tightness (1/world length).
+    """Make a majorant from the medium's bounds over `cells_of(model)`, times tightness.
 
-    With `control` (a tracker's parameters `control` and `share`) the extinction less the control is
-    bounded instead: |sigma_t - control| in each cell, times tightness.
+    `bounds` are minorant and majorant of each cell, [nz, ny, nx] (1/world length). With `control` (a
+    tracker's parameters `control` and `share`) the extinction less the control is bounded instead:
+    |sigma_t - control| in each cell, times tightness.
     """
-    counts = {"global": lambda: (1, 1, 1), "octree": lambda: (model.resolution,) * 3}
-    cells = tuple(counts.get(model.kind, lambda: model.resolution)())
-    bounds = _bounds(model, medium, cells, with_means=bool(control) and control["control"] == "mean")
-    majorants, controls = bounds.upper * tightness, None
-    if control:
-        controls = _controls(bounds, control)
-        residual = np.maximum(bounds.upper - controls, controls - bounds.lower)
-        majorants = residual * tightness
+    cells = _joined(
+        model, medium, bounds, with_means=bool(control) and control["control"] == "mean"
+    )
+    if control is None:
+        return _packed(model, medium, [cells.upper * tightness, cells.sizes, None])
+    controls = _controls(cells, control)
+    residual = np.maximum(cells.upper - controls, controls - cells.lower) * tightness
+    excess = float((controls - cells.lower).max() / max(cells.upper.max(), np.finfo(float).tiny))
+    made = _packed(model, medium, [residual, cells.sizes, controls])
+    return replace(made, control_excess=excess)
+
+
+def _packed(model: Any, medium: Medium, arrays: list[np.ndarray | None]) -> Majorant:
+    """Numbers of one cell, or arrays behind each other of many: majorants, sizes, controls."""
+    given = [array for array in arrays if array is not None]
     if model.kind == "global":
-        values = (majorants,) if controls is None else (majorants, controls)
-        names = ("sigma_t",) if controls is None else ("residual", "control")
-        return Majorant({n: float(v[0, 0, 0]) for n, v in zip(names, values, strict=True)})
-    return _arrays(model, medium, cells, [majorants, bounds.sizes, controls])
-
-
-def _arrays(model: Any, medium: Medium, cells: tuple, arrays: list) -> Majorant:
-    numbers = {"resolution": cells[0]}
+        names = ("sigma_t",) if len(given) == 1 else ("residual", "control")
+        return Majorant({n: float(a[0, 0, 0]) for n, a in zip(names, given, strict=True)})
+    cells = cells_of(model)
+    numbers: dict[str, float] = {"resolution": cells[0]}
     if model.kind == "grid":
         numbers = {f"n{axis}": n for axis, n in zip("xyz", cells, strict=True)}
     per_length = np.array(cells) / medium.extent
@@ -77,21 +98,24 @@ def _arrays(model: Any, medium: Medium, cells: tuple, arrays: list) -> Majorant:
     # The walk through a grid may step one cell too far where rounding puts a plane just inside the
     # ray's end; that through an octree holds its cell inside.
     padding = 1 if model.kind == "grid" else 0
-    padded = [np.pad(array, padding, mode="edge") for array in arrays if array is not None]
+    padded = [np.pad(array, padding, mode="edge") for array in given]
     numbers["cells"] = padded[0].size
     return Majorant(numbers, np.stack(padded).astype(np.float32))
 
 
-def _bounds(model: Any, medium: Medium, cells: tuple, *, with_means: bool) -> Cells:
-    lower, upper = medium.bounds(cells)
-    means = _means(medium, cells, lower, upper) if with_means else None
+def _joined(
+    model: Any, medium: Medium, bounds: tuple[np.ndarray, np.ndarray], *, with_means: bool
+) -> Cells:
+    """The cells of a config's majorant; those of an octree have the values of their leaves."""
+    lower, upper = bounds
+    means = _means(medium, cells_of(model), lower, upper) if with_means else None
     if model.kind != "octree":
         return Cells(lower, upper, means)
     sizes = leaf_sizes(upper, model.slack)
-    joined = means if means is None else over_leaves(means, sizes, np.mean)
-    return Cells(
-        over_leaves(lower, sizes, np.min), over_leaves(upper, sizes, np.max), joined, sizes
-    )
+    if means is not None:
+        means = over_leaves(means, sizes, np.mean)
+    lower, upper = over_leaves(lower, sizes, np.min), over_leaves(upper, sizes, np.max)
+    return Cells(lower, upper, means, sizes)
 
 
 def _controls(bounds: Cells, control: Mapping[str, Any]) -> np.ndarray:

@@ -81,7 +81,9 @@ def chart(rows: list[Row], columns: int = 2) -> Any:
     device = next(iter(by_device(rows)))
     panels = [_panel(altair, members) for members in _groups(rows)]
     if not panels:
-        raise FreepathError("the result has no case that was measured, so there is no picture of it")
+        raise FreepathError(
+            "the result has no case that was measured, so there is no picture of it"
+        )
     title = altair.TitleParams(
         "What accuracy costs in time",
         subtitle=[device, "a dot: one sample; a curve that turns level has met its bias"],

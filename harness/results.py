@@ -6,7 +6,7 @@ import csv
 import json
 import math
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ from freepath.errors import FreepathError
 
 SCHEMA_VERSION = 1
 SUMMARY, SAMPLES, RUN = "summary.csv", "samples.csv", "run.json"
+LOCK = ".lock"
 # fmt: off
 COLUMNS = (
     "schema_version", "run_id", "case_id", "case", "status", "reason",
@@ -23,84 +24,158 @@ COLUMNS = (
     "lookups_per_sample", "crossings_per_sample", "steps_per_sample", "lane_occupancy",
     "time_per_sample_s", "time_per_sample_cv", "time_noise", "timing_source",
     "time_device_s", "time_wall_s", "device_time_share", "time_build_s", "lookups_per_s",
-    "estimate", "reference", "bias", "bias_stderr", "bias_rms", "z_score", "variance", "rmse",
+    "estimate", "reference", "bias", "bias_stderr", "bias_rms", "z_score",
+    "variance", "variance_noise", "rmse",
     "inv_efficiency_lookups", "inv_efficiency_s", "time_to_1pct_s",
     "truncated", "nonfinite", "violations", "counted_samples",
     "source_sha256", "config_sha256",
 )
 SAMPLE_COLUMNS = (
-    "schema_version", "run_id", "case_id", "round", "samples", "first_sample_of_ray",
-    "time_device_s", "time_wall_s", "iterations", "estimate", "variance",
+    "schema_version", "run_id", "case_id", "device", "platform", "round",
+    "samples", "first_sample_of_ray", "time_device_s", "time_wall_s", "iterations",
+    "estimate", "variance",
 )
+TEXTS = frozenset((
+    "run_id", "case_id", "case", "status", "reason", "device", "platform", "driver_version",
+    "tracker", "estimand", "medium", "majorant", "effects", "arithmetic", "params", "stopped",
+    "timing_source", "source_sha256", "config_sha256",
+))
 # fmt: on
-KEY = ("case_id", "config_sha256", "source_sha256", "device", "driver_version")
+"""Columns that are no numbers, even where they look like one: a case_id may be 123456789012."""
+PLACE = ("case_id", "device", "platform")
+"""What a row is about: a later row of the same place takes its place."""
+KEY = (*PLACE, "driver_version", "config_sha256", "source_sha256")
 """A row of an interrupted run stands if all of these are what they would be now."""
+SESSION = (*PLACE, "run_id")
+"""What the rows of a case's rounds have in common with its own row."""
 FINAL = ("ok", "skipped", "invalid", "mismatch")
 """Statuses that running again would only repeat."""
+
+Row = dict[str, str]
 
 
 class ResultFolder:
     """Writes a run's files; every row is on the disk as soon as its case is done."""
 
     def __init__(self, folder: Path, *, resume: bool = False):
+        """Look at the folder without touching it; `open` makes it ready to be written to.
+
+        Raises FreepathError if it holds a run and must not, or does not and must.
+        """
         self.folder = folder
-        self.kept: list[dict[str, str]] = []
-        summary = folder / SUMMARY
-        if summary.exists() and not resume:
-            raise FreepathError(
-                f"{folder} already holds a run; continue it with --resume or name another folder"
-            )
-        if resume and not summary.exists():
-            raise FreepathError(f"{folder} holds no run to resume (no {SUMMARY} there)")
+        self._resume = resume
+        self._lock: Any = None
         try:
-            folder.mkdir(parents=True, exist_ok=True)
-            if resume:
-                self.kept = [row for row in read_rows(summary) if row["status"] in FINAL]
-            else:
-                self._rewrite(SUMMARY, COLUMNS, [])
-                self._rewrite(SAMPLES, SAMPLE_COLUMNS, [])
+            if folder.exists() and not folder.is_dir():
+                raise FreepathError(f"{folder}: is a file, expected a folder for the results")
+            holds = [name for name in (SUMMARY, SAMPLES, RUN) if (folder / name).exists()]
         except OSError as error:
-            raise FreepathError(f"cannot write to {folder}: {error.strerror}") from error
+            raise FreepathError(f"{folder}: cannot be looked into: {error.strerror}") from error
+        if resume and SUMMARY not in holds:
+            raise FreepathError(f"{folder}: holds no run to resume (no {SUMMARY} there)")
+        if holds and not resume:
+            raise FreepathError(
+                f"{folder}: already holds {', '.join(holds)}; "
+                "go on with that run by --resume, or name another folder"
+            )
 
-    def keep(self, keys: set[tuple[str, ...]]) -> set[tuple[str, ...]]:
-        """Keep the rows of an earlier run whose key is wanted, drop all others; returns their keys."""
-        self.kept = [row for row in self.kept if key_of(row) in keys]
-        cases = {row["case_id"] for row in self.kept}
+    def open(self, planned: Sequence[Mapping[str, Any]]) -> set[tuple[str, ...]]:
+        """Make the folder, or take it over: rows that stand stay, rows to be made anew go.
+
+        `planned` holds at least the KEY columns of every row that is wanted; returns the keys of
+        those that are there already. Rows of other cases and devices are left alone.
+        """
+        wanted, places = {key_of(row) for row in planned}, {_of(row, PLACE) for row in planned}
+
+        def stands(row: Row) -> bool:
+            return key_of(row) in wanted and row["status"] in FINAL
+
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            self._acquire()
+            old = self.rows() if self._resume else []
+            kept = [row for row in old if stands(row) or _of(row, PLACE) not in places]
+            sessions = {_of(row, SESSION) for row in kept}
+            rounds = [row for row in self._rounds() if _of(row, SESSION) in sessions]
+            self._rewrite(SUMMARY, COLUMNS, kept)
+            self._rewrite(SAMPLES, SAMPLE_COLUMNS, rounds)
+        except OSError as error:
+            raise FreepathError(f"{self.folder}: cannot be written to: {error.strerror}") from error
+        return {key_of(row) for row in kept if stands(row)}
+
+    def _acquire(self) -> None:
+        """Keep others from writing here; the system lets go of the lock when the process ends."""
+        import filelock
+
+        self._lock = filelock.FileLock(self.folder / LOCK)
+        try:
+            self._lock.acquire(timeout=0)
+        except filelock.Timeout:
+            raise FreepathError(f"{self.folder}: another freepath is writing there") from None
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the folder holds this run, so that it can be gone on with."""
+        return self._lock is not None
+
+    def close(self) -> None:
+        """Let others write here."""
+        if self._lock:
+            (self.folder / LOCK).unlink(missing_ok=True)
+            self._lock.release()
+
+    def _rounds(self) -> list[Row]:
         samples = self.folder / SAMPLES
-        old = read_rows(samples, SAMPLE_COLUMNS) if samples.exists() else []
-        self._rewrite(SUMMARY, COLUMNS, self.kept)
-        self._rewrite(SAMPLES, SAMPLE_COLUMNS, [row for row in old if row["case_id"] in cases])
-        return {key_of(row) for row in self.kept}
+        return read_rows(samples, SAMPLE_COLUMNS) if self._resume and samples.exists() else []
 
-    def _rewrite(self, name: str, columns: tuple[str, ...], rows: list[dict]) -> None:
+    def _rewrite(self, name: str, columns: tuple[str, ...], rows: list[Row]) -> None:
         """Replace a file in one step, so that an interruption leaves the old or the new one."""
         temporary = self.folder / f"{name}.part"
         with temporary.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, columns)
-            writer.writeheader()
-            writer.writerows(rows)
+            _writer(file, columns).writeheader()
+            _writer(file, columns).writerows(rows)
+            _flush(file)
         os.replace(temporary, self.folder / name)
 
-    def append(self, row: dict[str, Any], rounds: Iterable[dict[str, Any]] = ()) -> None:
-        """Write a case's row and its rounds' rows, and flush them."""
+    def append(self, row: Mapping[str, Any], rounds: Iterable[Mapping[str, Any]] = ()) -> None:
+        """Write a case's row and, before it, those of its rounds; both are on the disk then."""
         self._append(SAMPLES, SAMPLE_COLUMNS, rounds)
         self._append(SUMMARY, COLUMNS, [row])
 
-    def _append(self, name: str, columns: tuple[str, ...], rows: Iterable[dict]) -> None:
-        with (self.folder / name).open("a", newline="", encoding="utf-8") as file:
-            csv.DictWriter(file, columns).writerows(
-                {column: _text(row[column]) for column in columns} for row in rows
-            )
-            file.flush()
-            os.fsync(file.fileno())
+    def _append(self, name: str, columns: tuple[str, ...], rows: Iterable[Mapping]) -> None:
+        texts = [{column: _text(row[column]) for column in columns} for row in rows]
+        try:
+            with (self.folder / name).open("a", newline="", encoding="utf-8") as file:
+                _writer(file, columns).writerows(texts)
+                _flush(file)
+        except OSError as error:
+            raise FreepathError(f"{self.folder / name}: {error.strerror}") from error
 
-    def write_run(self, facts: dict[str, Any]) -> None:
+    def write_run(self, facts: Mapping[str, Any]) -> None:
         """Write run.json."""
         temporary = self.folder / f"{RUN}.part"
-        temporary.write_text(json.dumps(facts, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-        os.replace(temporary, self.folder / RUN)
+        text = json.dumps(facts, indent=1, allow_nan=False) + "\n"
+        try:
+            temporary.write_text(text, encoding="utf-8")
+            os.replace(temporary, self.folder / RUN)
+        except OSError as error:
+            raise FreepathError(f"{self.folder / RUN}: {error.strerror}") from error
 
-    def rows(self) -> list[dict[str, str]]:
+    def read_run(self) -> dict[str, Any]:
+        """What run.json says; empty where there is none that can be read."""
+        try:
+            facts = json.loads((self.folder / RUN).read_text("utf-8"))
+        except (OSError, ValueError):
+            return {}
+        return facts if isinstance(facts, dict) else {}
+
+    def write_log(self, name: str, text: str) -> Path:
+        """Write a compiler's log beside the rows."""
+        path = self.folder / name
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    def rows(self) -> list[Row]:
         """All rows so far, as they stand in the file."""
         return read_rows(self.folder / SUMMARY)
 
@@ -109,33 +184,60 @@ class ResultFolder:
         return [self.folder / name for name in (SUMMARY, SAMPLES, RUN)]
 
 
-def key_of(row: dict[str, str]) -> tuple[str, ...]:
+def _writer(file: Any, columns: tuple[str, ...]) -> csv.DictWriter:
+    return csv.DictWriter(file, columns, lineterminator="\n")
+
+
+def _flush(file: Any) -> None:
+    file.flush()
+    os.fsync(file.fileno())
+
+
+def _of(row: Mapping[str, Any], columns: tuple[str, ...]) -> tuple[str, ...]:
+    return tuple(row[column] for column in columns)
+
+
+def key_of(row: Mapping[str, Any]) -> tuple[str, ...]:
     """What must agree for a row to stand for a case."""
-    return tuple(row[column] for column in KEY)
+    return _of(row, KEY)
 
 
 def _text(value: Any) -> Any:
     """None is empty; floats in full; inf as the word that every reader of CSV knows."""
-    if value is None:
+    if value is None or (isinstance(value, float) and math.isnan(value)):
         return ""
-    if isinstance(value, float):
-        if math.isnan(value):
-            return ""
-        return repr(value)
-    return value
+    # of numpy's floats too, whose repr names their type
+    return repr(float(value)) if isinstance(value, float) else value
 
 
-def read_rows(path: Path, columns: tuple[str, ...] = COLUMNS) -> list[dict[str, str]]:
+def read_rows(path: Path, columns: tuple[str, ...] = COLUMNS) -> list[Row]:
     """Read a CSV of a run; a last row that was cut off by a crash is left out.
 
-    Raises FreepathError where the file is not of this schema version.
+    Raises FreepathError where the file cannot be read or is not of this schema version.
     """
     try:
-        with path.open(newline="", encoding="utf-8") as file:
+        # a row may have been cut off within a character
+        with path.open(newline="", encoding="utf-8", errors="replace") as file:
             reader = csv.DictReader(file)
             rows = [row for row in reader if None not in row.values() and None not in row]
-    except (OSError, csv.Error, UnicodeDecodeError) as error:
+    except (OSError, csv.Error) as error:
         raise FreepathError(f"{path}: cannot be read: {error}") from error
     if tuple(reader.fieldnames or ()) != columns:
         raise FreepathError(f"{path}: its columns are not those of schema version {SCHEMA_VERSION}")
     return rows
+
+
+def records(rows: Iterable[Row]) -> list[dict[str, Any]]:
+    """Rows with numbers as numbers and empty cells as None; inf stays a word, as JSON has none."""
+    return [{column: _value(column, text) for column, text in row.items()} for row in rows]
+
+
+def _value(column: str, text: str) -> Any:
+    if text == "":
+        return None
+    if column in TEXTS:
+        return text
+    value = float(text)
+    if not math.isfinite(value):
+        return text
+    return int(text) if text.isdigit() else value

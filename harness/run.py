@@ -1,13 +1,13 @@
-"""A whole run: a config's cases on devices, with what is shown meanwhile and at its end."""
+"""A whole run: a config's cases on devices, and what run.json tells of it."""
 
 from __future__ import annotations
 
 import dataclasses
 import datetime
 import os
+import re
 import time
 import uuid
-from collections import defaultdict
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -18,11 +18,13 @@ from freepath.config import Config
 from freepath.device import Device
 from freepath.errors import FreepathError
 from freepath.plan import Case
-from freepath.results import ResultFolder
-from freepath.scene import Medium, build_medium
-from freepath.sweep import Job, Scene, Sweep, pending
+from freepath.results import SCHEMA_VERSION, ResultFolder, key_of
+from freepath.scene import build_medium
+from freepath.source import BUILD_OPTIONS, combined_hash
+from freepath.sweep import Job, Scene, Sweep
 
-FAILED = ("invalid", "build_failed", "run_failed", "timeout", "crashed", "mismatch")
+RESULTS = Path("results")
+STAMP = "%Y%m%d-%H%M%S"
 
 
 @dataclasses.dataclass
@@ -39,9 +41,18 @@ class Clock:
         return time.perf_counter() - self.started
 
     @property
-    def device_share(self) -> float:
-        """Device time over all wall time outside compilation."""
-        return self.device_s / max(self.wall_s - self.build_s, 1e-9)
+    def outside_s(self) -> float:
+        """Since the start, without compilation."""
+        return self.wall_s - self.build_s
+
+    def as_dict(self) -> dict[str, float]:
+        """What run.json says of it."""
+        return {
+            "time_wall_s": self.wall_s,
+            "time_build_s": self.build_s,
+            "time_device_s": self.device_s,
+            "device_time_share": self.device_s / max(self.outside_s, 1e-9),
+        }
 
 
 def search_path(config: Config) -> list[Path]:
@@ -49,115 +60,134 @@ def search_path(config: Config) -> list[Path]:
     return [config.path.parent] if config.path else []
 
 
-def build_media(cases: list[Case], folders: list[Path]) -> dict[str, Medium]:
-    """Read or make every medium once, before anything runs; keyed by its model's text."""
-    media: dict[str, Medium] = {}
+def build_scenes(cases: list[Case], folders: list[Path]) -> dict[str, Scene]:
+    """Read or make every medium once, with its rays; keyed by `scene_key`."""
+    scenes: dict[str, Scene] = {}
     for case in cases:
-        key = str(case.medium.as_dict())
-        if key not in media:
-            media[key] = build_medium(case.medium, folders)
-    return media
+        key = scene_key(case)
+        if key not in scenes:
+            scenes[key] = Scene.of(case, build_medium(case.medium, folders), folders)
+    return scenes
 
 
-def folder_of(name: str, *, resume: bool) -> Path:
-    """A new folder below results/, named after the config and the time, or its newest to resume."""
-    if resume:
-        found = sorted(Path("results").glob(f"{name}-[0-9]*"))
-        if not found:
-            raise FreepathError(f"no run of {name} in results/ to resume; name its folder with -o")
-        return found[-1]
-    stamp = datetime.datetime.now().strftime("%Y%m%d-%H%M%S")
-    return Path("results") / f"{name}-{stamp}"
+def scene_key(case: Case) -> str:
+    """What cases of the same scene have in common; all cases of a config fly the same rays."""
+    return str(case.medium.as_dict())
 
 
+def new_folder(name: str) -> Path:
+    """A folder below results/ that is not there yet, named after the config and the time."""
+    stem = f"{name}-{datetime.datetime.now().strftime(STAMP)}"
+    numbered = (RESULTS / f"{stem}-{number}" for number in range(2, 1000))
+    return next(path for path in (RESULTS / stem, *numbered) if not path.exists())
 
 
+def newest_folder(name: str) -> Path:
+    """The folder below results/ of the last run of a config; raises FreepathError without one."""
+    stamped = re.compile(re.escape(name) + r"-[0-9]{8}-[0-9]{6}(-[0-9]+)?")
+    found = [path for path in RESULTS.glob("*/") if stamped.fullmatch(path.name)]
+    if not found:
+        raise FreepathError(f"no run of {name} in {RESULTS}/ to resume; name its folder with -o")
+    return max(found, key=lambda path: path.name)
+
+
+@dataclasses.dataclass
 class Run:
     """Runs cases on devices, one device after the other, one scene after the other."""
 
-    def __init__(
-        self,
-        config: Config,
-        catalog: Catalog,
-        cases: list[Case],
-        folder: ResultFolder,
-        clock: Clock,
-        on_done: Callable[[dict[str, Any]], None],
-        on_progress: Callable[[float, float], None],
-    ):
-        self.run_id = uuid.uuid4().hex[:12]
-        self.cases = cases
-        self.folder = folder
-        self._config = config
-        self._catalog = catalog
-        self._clock = clock
-        self._on_done = on_done
-        self._on_progress = on_progress
-        self._facts: dict[str, Any] = {}
-        self.total = len(cases)
-        self.ended = 0
+    config: Config
+    catalog: Catalog
+    cases: list[Case]
+    folder: ResultFolder
+    clock: Clock
+    on_done: Callable[[dict[str, Any]], None]
+    """Told every row once it is written."""
+    on_progress: Callable[[float, int, str], None]
+    """Told how many cases are done, of how many, and what is being done."""
+    run_id: str = dataclasses.field(default_factory=lambda: uuid.uuid4().hex[:12])
+    total: int = 0
+    ended: int = 0
 
     def execute(self, devices: list[Device]) -> None:
         """Measure everything that is not in the folder already.
 
-        run.json is there from the start, and says at the end whether the run was interrupted.
+        The folder is made when all that can be wrong with config and volumes has been found. Its
+        run.json is there from then on, and says at the end how the run ended.
         """
-        self._facts = self._describe(devices)
-        self.folder.write_run(self._facts | {"state": "interrupted"})
-        folders = search_path(self._config)
-        media = build_media(self.cases, folders)
-        scenes = {key: Scene.of(self.cases[0], medium, folders) for key, medium in media.items()}
+        self.on_progress(0.0, len(self.cases) * len(devices), "preparing scenes")
+        scenes = build_scenes(self.cases, search_path(self.config))
         plans = [(sweep, self._plan(sweep, scenes)) for sweep in map(self._sweep, devices)]
-        jobs = [job for _, plan in plans for group in plan.values() for job in group]
-        left = {id(job) for job in pending(self.folder, jobs)}
-        self.total = len(left)
-        for sweep, plan in plans:
-            for key, group in plan.items():
-                sweep.run(scenes[key], [job for job in group if id(job) in left], self._config.seed)
-            self._clock.build_s += sweep.time_build_s
-        self.folder.write_run(self._facts | {"state": "complete", **self._times()})
+        jobs = [job for _, plan in plans for job in plan]
+        done = self.folder.open([job.row for job in jobs])
+        self.total = sum(key_of(job.row) not in done for job in jobs)
+        if not self.total:
+            self.folder.close()
+            return
+        facts = self._describe(devices, jobs)
+        session = self._session(devices)
+        ended = "failed"
+        try:
+            self._write(facts, session | {"ended": "running, or killed"})
+            for sweep, plan in plans:
+                self._run(sweep, scenes, [job for job in plan if key_of(job.row) not in done])
+            ended = "complete"
+        except KeyboardInterrupt:
+            ended = "interrupted"
+            raise
+        finally:
+            self._write(facts, session | {"ended": ended, **self.clock.as_dict()})
+            self.folder.close()
 
     def _sweep(self, device: Device) -> Sweep:
-        return Sweep(device, self._catalog, self.folder, self.run_id, self._done, self._progress)
+        return Sweep(device, self.catalog, self.folder, self.run_id, self._done, self._progress)
 
-    def _plan(self, sweep: Sweep, scenes: dict[str, Scene]) -> dict[str, list[Job]]:
-        plan: dict[str, list[Job]] = defaultdict(list)
-        for case in self.cases:
-            key = str(case.medium.as_dict())
-            plan[key].append(sweep.plan(case, scenes[key]))
-        return plan
+    def _plan(self, sweep: Sweep, scenes: dict[str, Scene]) -> list[Job]:
+        return [sweep.plan(case, scenes[scene_key(case)]) for case in self.cases]
+
+    def _run(self, sweep: Sweep, scenes: dict[str, Scene], jobs: list[Job]) -> None:
+        try:
+            for key, scene in scenes.items():
+                group = [job for job in jobs if scene_key(job.case) == key]
+                sweep.run(scene, group, self.config.seed)
+        finally:
+            self.clock.build_s += sweep.time_build_s
 
     def _done(self, row: dict[str, Any]) -> None:
         self.ended += 1
-        self._clock.device_s += row["time_device_s"] or 0.0
-        self._on_done(row)
+        self.clock.device_s += row["time_device_s"] or 0.0
+        self.on_done(row)
 
-    def _progress(self, under_way: float) -> None:
-        self._on_progress(self.ended + under_way, self.total)
+    def _progress(self, under_way: float, what: str) -> None:
+        self.on_progress(self.ended + under_way, self.total, what)
 
-    def _times(self) -> dict[str, Any]:
-        clock = self._clock
+    def _describe(self, devices: list[Device], jobs: list[Job]) -> dict[str, Any]:
+        """What is so for the whole run."""
+        hashes = ("case_id", "case", "device", "config_sha256", "source_sha256")
         return {
-            "time_wall_s": clock.wall_s,
-            "time_build_s": clock.build_s,
-            "time_device_s": clock.device_s,
-            "device_time_share": clock.device_share,
+            "schema_version": SCHEMA_VERSION,
+            "config_file": str(self.config.path),
+            "config": self.config.as_dict(),
+            "config_text": self.config.text,
+            "config_sha256": combined_hash(self.config.text),
+            "seed": self.config.seed,
+            "devices": [dataclasses.asdict(device.info) for device in devices],
+            "build_options": {name: list(options) for name, options in BUILD_OPTIONS.items()},
+            "cases": [{name: job.row[name] for name in hashes} for job in jobs],
         }
 
-    def _describe(self, devices: list[Device]) -> dict[str, Any]:
+    def _session(self, devices: list[Device]) -> dict[str, Any]:
+        """What is so until the run ends or is interrupted, and may be otherwise when it goes on."""
         return {
             "run_id": self.run_id,
             "started": datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds"),
             "process": os.getpid(),
-            "config": self._config.as_dict(),
-            "config_text": self._config.text,
-            "seed": self._config.seed,
-            "cases": [{"case_id": case.case_id, "case": case.name} for case in self.cases],
-            "devices": [dataclasses.asdict(device.info) for device in devices],
+            "devices": [device.info.label for device in devices],
+            "cases_to_run": self.total,
             "host": environment.describe(),
         }
 
-
-def failures(rows: list[dict[str, str]]) -> list[dict[str, str]]:
-    """The rows of cases that went wrong."""
-    return [row for row in rows if row["status"] in FAILED]
+    def _write(self, facts: dict[str, Any], session: dict[str, Any]) -> None:
+        sessions = self.folder.read_run().get("sessions")
+        earlier = sessions if isinstance(sessions, list) else []
+        others = [s for s in earlier if isinstance(s, dict) and s.get("run_id") != self.run_id]
+        self.folder.write_run(facts | {"sessions": [*others, session]})

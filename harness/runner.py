@@ -3,35 +3,56 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import pyopencl as cl
-
 from freepath.device import COUNTERS, Device, Program, scalar_type
-from freepath.source import Source
 from freepath.stats import Moments, merge_blocks
 
 STEP_CAP = 1 << 20
 """Steps after which a path is cut off and counted as truncated."""
 SAMPLES_PER_UNIT = (1 << 31) // STEP_CAP - 1
 """So that the 32-bit counters of a unit cannot overflow even if every path reaches the cap."""
+LAUNCH_S = 0.25
+"""Device time below which a launch should stay. What is longer is cut into launches of half of it,
+as some rays take longer than others."""
+
+
+Outputs = dict[str, cl.Buffer]
 
 
 @dataclass(frozen=True)
 class KernelData:
-    """What a kernel reads, on the device: shared by all cases that fly the same rays."""
+    """What kernels read and write, on the device: shared by all cases that fly the same rays."""
 
+    device: Device
     rays: cl.Buffer
     ray_count: int
     medium: cl.Buffer
+    _kept: dict[Any, cl.Buffer] = field(default_factory=dict, repr=False, compare=False)
 
     @classmethod
-    def upload(cls, device: Device, segments: np.ndarray, medium_data, arithmetic: str) -> KernelData:
+    def upload(
+        cls, device: Device, segments: np.ndarray, medium_data: np.ndarray | None, arithmetic: str
+    ) -> KernelData:
         """Upload segments (rays, 7) and the medium's array (or None)."""
-        data = np.zeros(0, np.float32) if medium_data is None else medium_data
         rays = device.upload(segments.astype(scalar_type(arithmetic)))
-        return cls(rays, len(segments), device.upload(data))
+        return cls(device, rays, len(segments), device.upload(medium_data))
+
+    def keep(self, key: Any, array: np.ndarray | None) -> cl.Buffer:
+        """Upload an array (or None) unless one was before under this key."""
+        if key not in self._kept:
+            self._kept[key] = self.device.upload(array)
+        return self._kept[key]
+
+    def output(self, name: str, size: int) -> cl.Buffer:
+        """A buffer of so many bytes or more; kept, as allocating it costs more than filling it."""
+        if name not in self._kept or self._kept[name].size < size:
+            self._kept.pop(name, None)
+            self._kept[name] = self.device.allocate(size)
+        return self._kept[name]
 
 
 @dataclass(frozen=True)
@@ -41,8 +62,8 @@ class Round:
     samples: int
     """Samples of all rays together."""
     estimate: float
-    variance: float
-    """Of one sample, averaged over rays."""
+    variance: float | None
+    """Of one sample, averaged over rays; None where a ray has but one sample."""
     counters: dict[str, int]
     iterations: int
     time_device_s: float
@@ -51,43 +72,72 @@ class Round:
     moments: Moments | None
     """Per ray; let go of once it is merged with those of other rounds."""
     recorded: np.ndarray | None = None
-    """(units, samples, 4): t, weight, escaped, lookups so far in the unit; only of recording kernels."""
+    """(units, samples, 4): t, weight, escaped, lookups so far in the unit; of recording kernels."""
 
     @property
     def time_s(self) -> float:
         """Device time, or wall time where the driver reports none."""
         return self.time_device_s if self.timing_source == "device" else self.time_wall_s
 
+    @property
+    def time_per_sample_s(self) -> float:
+        """`time_s` of one sample."""
+        return self.time_s / self.samples
 
+
+class Pace:
+    """How many samples fit into a launch, judged by how long the ones before took."""
+
+    def __init__(self, first: int):
+        self._most = first
+        self._seconds_per_sample = 0.0
+
+    def fit(self, left: int) -> int:
+        """Samples for the next launch, of so many that are left."""
+        pace = self._seconds_per_sample
+        if left <= self._most and left * pace <= LAUNCH_S:
+            return left
+        return min(left, self._most, int(LAUNCH_S / 2 / pace) if pace else left)
+
+    def took(self, samples: int, seconds: float) -> None:
+        """Learn from a launch; the next may be four times as large, however quick this one was."""
+        self._most = max(self._most, 4 * samples)
+        self._seconds_per_sample = seconds / samples
+
+
+@dataclass
 class Runner:
     """A program bound to its rays, medium, majorant and numbers."""
 
-    def __init__(
-        self,
-        program: Program,
-        data: KernelData,
-        numbers: list[float],
-        majorant_data: np.ndarray | None,
-        arithmetic: str,
-        lanes: int,
-        seed: int,
-    ):
-        self.program = program
-        self.lanes = lanes
-        self.rays = data.ray_count
-        self._data = data
-        self._device = program.device
-        self._scalar = scalar_type(arithmetic)
-        self._seed = np.uint64(seed)
-        self._numbers = self._device.upload(np.array(numbers, self._scalar))
-        majorant = np.zeros(0, np.float32) if majorant_data is None else majorant_data
-        self._majorant = self._device.upload(majorant)
-        self._buffers: dict[tuple, cl.Buffer] = {}
+    program: Program
+    data: KernelData
+    numbers: cl.Buffer
+    majorant: cl.Buffer
+    arithmetic: str
+    lanes: int
+    seed: int
+    _pace: Pace = field(init=False, repr=False)
+
+    def __post_init__(self):
+        self._pace = Pace(self.lanes_in_all)
 
     @property
-    def source(self) -> Source:
-        """The source of the program."""
-        return self.program.source
+    def rays(self) -> int:
+        """How many rays each sample number stands for."""
+        return self.data.ray_count
+
+    @property
+    def _device(self) -> Device:
+        return self.program.device
+
+    @property
+    def _scalar(self) -> np.dtype:
+        return scalar_type(self.arithmetic)
+
+    @property
+    def lanes_in_all(self) -> int:
+        """Paths that the device follows at once."""
+        return self._device.work_items[0] * self.lanes
 
     def run(
         self,
@@ -95,84 +145,92 @@ class Runner:
         samples: int,
         blocks: int = 1,
         *,
-        launches: int = 1,
+        launches: int | None = None,
         record: bool = False,
         work_items: tuple[int, int] | None = None,
     ) -> Round:
-        """Take `blocks` blocks of `samples` samples of every ray, cut into `launches` launches.
+        """Take `blocks` blocks of `samples` samples of every ray.
 
-        Sample numbers start at first_sample; each is the same however it is blocked and cut.
+        In launches that stay short, unless it is said how many. Sample numbers start at
+        first_sample; each sample is the same however it is blocked and cut.
         """
         units = self.rays * blocks
         work_items = work_items or self._device.work_items
         outputs = self._outputs(units, work_items[0], samples if record else 0)
-        time_device, iterations, started = 0.0, 0, time.perf_counter()
-        for first, end in _cuts(units, launches):
-            time_device += self._launch(first_sample, samples, first, end, outputs, work_items)
+        time_device, iterations, first, started = 0.0, 0, 0, time.perf_counter()
+        while first < units:
+            end = first + self._units_of_a_launch(units - first, units, samples, launches)
+            numbers = range(first_sample, first_sample + samples)
+            time_device += self._launch(numbers, first, end, outputs, work_items)
             iterations += int(self._read("iterations", outputs, (work_items[0],), np.uint64).sum())
+            first = end
         time_wall = time.perf_counter() - started
-        moments = self._read("moments", outputs, (blocks, self.rays, 2), self._scalar)
+        moments = self._moments(outputs, blocks, samples)
         counters = self._read("counters", outputs, (units, len(COUNTERS)), np.uint32)
         recorded = None
         if record:
             recorded = self._read("recorded", outputs, (units, samples, 4), self._scalar)
-        merged = merge_blocks(moments[..., 0], moments[..., 1], samples)
         return Round(
             samples=units * samples,
-            estimate=float(merged.mean.mean()),
-            variance=float(merged.variance.mean()),
+            estimate=float(moments.mean.mean()),
+            variance=float(moments.variance.mean()) if moments.count > 1 else None,
             counters=dict(zip(COUNTERS, counters.sum(0, dtype=np.uint64).tolist(), strict=True)),
             iterations=iterations,
             time_device_s=time_device,
             time_wall_s=time_wall,
             timing_source="device" if time_device > 0 else "wall",
-            moments=merged,
+            moments=moments,
             recorded=recorded,
         )
 
-    def _launch(self, first_sample, samples, first, end, outputs, work_items) -> float:
-        queue = self._device.queue
-        cl.enqueue_copy(queue, outputs["taken"], np.array([first], np.uint32))
+    def _units_of_a_launch(self, left: int, units: int, samples: int, launches: int | None) -> int:
+        if launches:
+            return min(left, -(-units // launches))
+        # fewer units than lanes would take as long
+        return min(left, max(self.lanes_in_all, self._pace.fit(left * samples) // samples))
+
+    def _launch(
+        self, samples: range, first: int, end: int, outputs: Outputs, work_items: tuple[int, int]
+    ) -> float:
+        """Run units first to end; `samples` are the numbers of the first block. Event seconds."""
+        started = time.perf_counter()
+        self._device.write(outputs["taken"], np.array([first], np.uint32))
         arguments = [
-            self._seed,
-            np.uint64(first_sample),
-            np.uint32(samples),
+            np.uint64(self.seed),
+            np.uint64(samples.start),
+            np.uint32(len(samples)),
             np.uint32(end),
             np.uint32(self.rays),
             np.uint32(STEP_CAP),
-            self._numbers,
-            self._data.rays,
-            self._data.medium,
-            self._majorant,
-            *(outputs[name] for name in ("taken", "moments", "counters", "iterations", "recorded")),
+            self.numbers,
+            self.data.rays,
+            self.data.medium,
+            self.majorant,
+            *outputs.values(),
         ]
-        return self.program.launch(arguments, *work_items)
+        seconds = self.program.launch(arguments, *work_items)
+        self._pace.took((end - first) * len(samples), seconds or time.perf_counter() - started)
+        return seconds
 
-    def _outputs(self, units: int, work_items: int, recorded: int) -> dict[str, cl.Buffer]:
+    def _outputs(self, units: int, work_items: int, recorded: int) -> Outputs:
+        """The kernel's last arguments, in its order."""
         scalar = self._scalar.itemsize
         sizes = {
             "taken": 4,
-            "moments": units * 2 * scalar,
+            "moments": units * 3 * scalar,
             "counters": units * 4 * len(COUNTERS),
             "iterations": work_items * 8,
             "recorded": max(units * recorded * 4 * scalar, 8),
         }
-        return {name: self._buffer(name, size) for name, size in sizes.items()}
+        return {name: self.data.output(name, size) for name, size in sizes.items()}
 
-    def _buffer(self, name: str, size: int) -> cl.Buffer:
-        """Keep output buffers between rounds: allocating them anew costs more than filling them."""
-        if (name, size) not in self._buffers:
-            self._buffers = {key: value for key, value in self._buffers.items() if key[0] != name}
-            buffer = cl.Buffer(self._device.context, cl.mem_flags.READ_WRITE, size)
-            self._buffers[name, size] = buffer
-        return self._buffers[name, size]
+    def _moments(self, outputs: Outputs, blocks: int, samples: int) -> Moments:
+        """The moments of each ray; a unit's mean comes in two parts, mean less excess."""
+        parts = self._read("moments", outputs, (blocks, self.rays, 3), self._scalar)
+        mean, excess, m2 = np.moveaxis(parts.astype(np.float64), -1, 0)
+        return merge_blocks(mean - excess, m2, samples)
 
-    def _read(self, name: str, outputs: dict, shape: tuple, dtype) -> np.ndarray:
-        array = np.empty(shape, dtype)
-        cl.enqueue_copy(self._device.queue, array, outputs[name])
-        return array
-
-
-def _cuts(units: int, launches: int) -> list[tuple[int, int]]:
-    edges = np.linspace(0, units, min(launches, units) + 1).astype(int).tolist()
-    return list(zip(edges[:-1], edges[1:], strict=True))
+    def _read(
+        self, name: str, outputs: Outputs, shape: tuple, dtype: np.dtype | type
+    ) -> np.ndarray:
+        return self._device.read(outputs[name], shape, dtype)

@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from freepath import kernel_files
+from freepath.errors import CatalogError
 from freepath.kernel_files import KernelFile
 
 SCALARS = {"strict": "float", "fast": "float", "double": "double"}
@@ -49,6 +50,10 @@ class Source:
     text: str
     options: tuple[str, ...]
 
+    def unoptimised(self) -> Source:
+        """The same to be built in less time and to run slower."""
+        return Source(self.text, (*self.options, "-cl-opt-disable"))
+
     @property
     def sha256(self) -> str:
         """Identifies the source and its options."""
@@ -66,21 +71,17 @@ def combined_hash(*parts: str | bytes) -> str:
 def compose(structure: Structure) -> Source:
     """Concatenate the files of a case, each behind a `#line` that names it to the compiler."""
     parts = [_defines(structure)]
-    parts += _named(_kernel(name) for name in _before_structs(structure))
+    parts += _named(kernel_files.read(name) for name in _before_structs(structure))
     walks = _with_uses(_walks(structure))
     parts.append(_structs(structure, walks))
     middle = [f"estimands/{structure.estimand}", "count/on" if structure.count else "count/off"]
     middle += [f"medium/{structure.medium}", "lanes/path"]
-    parts += _named(_kernel(name) for name in middle)
+    parts += _named(kernel_files.read(name) for name in middle)
     parts += _named(walks)
     parts += _named([KernelFile(f"trackers/{structure.tracker}.cl", structure.tracker_code)])
     record = "record/samples" if structure.record else "record/nothing"
-    parts += _named(_kernel(name) for name in ("lanes/tally", record, "main"))
+    parts += _named(kernel_files.read(name) for name in ("lanes/tally", record, "main"))
     return Source("\n".join(parts), BUILD_OPTIONS[structure.arithmetic])
-
-
-def _kernel(name: str) -> KernelFile:
-    return kernel_files.read(name)
 
 
 def _before_structs(structure: Structure) -> list[str]:
@@ -95,8 +96,8 @@ def _walks(structure: Structure) -> list[str]:
     if "majorant" in structure.needs:
         walk = "control" if "control" in structure.needs else "majorant"
         walks.append(f"{walk}/{structure.majorant}")
-    walks += [f"{need}/{structure.medium}" for need in ("closed_form", "cells") if need in structure.needs]
-    return walks
+    needed = (need for need in ("closed_form", "cells") if need in structure.needs)
+    return walks + [f"{need}/{structure.medium}" for need in needed]
 
 
 def _with_uses(names: Iterable[str]) -> list[KernelFile]:
@@ -105,7 +106,7 @@ def _with_uses(names: Iterable[str]) -> list[KernelFile]:
 
     def add(name: str) -> None:
         if name not in found:
-            file = _kernel(name)
+            file = kernel_files.read(name)
             for used in file.uses:
                 add(used)
             found[name] = file
@@ -144,7 +145,7 @@ def _defines(structure: Structure) -> str:
 
 
 def _structs(structure: Structure, walks: list[KernelFile]) -> str:
-    """Declare Numbers and Scene from the numbers of the parts, State from the files' front matter."""
+    """Declare Numbers and Scene from the parts' numbers, State from their front matter."""
     groups = {
         "box": BOX,
         "medium": structure.medium_numbers,
@@ -154,17 +155,19 @@ def _structs(structure: Structure, walks: list[KernelFile]) -> str:
     groups = {group: names for group, names in groups.items() if names}
     lines = ['#line 1 "structs"']
     for group, names in groups.items():
-        lines.append(f"typedef struct {{ SCALAR {', '.join(names)}; }} {group.capitalize()}Numbers;")
+        fields = ", ".join(names)
+        lines.append(f"typedef struct {{ SCALAR {fields}; }} {group.capitalize()}Numbers;")
     members = " ".join(f"{group.capitalize()}Numbers {group};" for group in groups)
     lines.append(f"typedef struct {{ {members} }} Numbers;")
     pointers = "__global const float *medium_data; __global const float *majorant_data;"
     lines.append(f"typedef struct {{ {members} {pointers} }} Scene;")
-    fields = "".join(f"numbers->{group}, " for group in groups)
+    values = "".join(f"numbers->{group}, " for group in groups)
     lines += [
-        "static Scene make_scene(__constant const Numbers *numbers, __global const float *medium_data,",
+        "static Scene make_scene(__constant const Numbers *numbers,",
+        "                        __global const float *medium_data,",
         "                        __global const float *majorant_data)",
         "{",
-        f"    const Scene scene = {{{fields}medium_data, majorant_data}};",
+        f"    const Scene scene = {{{values}medium_data, majorant_data}};",
         "    return scene;",
         "}",
     ]
@@ -172,20 +175,34 @@ def _structs(structure: Structure, walks: list[KernelFile]) -> str:
 
 
 def _state(structure: Structure, walks: list[KernelFile]) -> list[str]:
+    """Declare what a path carries for its walk and its tracker, and how lanes take it over."""
     state = {name: kind for file in walks for name, kind in file.state.items()}
-    state.update(structure.tracker_state)
+    taken = sorted(state.keys() & dict(structure.tracker_state).keys())
+    if taken:
+        message = f"expected a name for its state other than '{taken[0]}', which a walk uses"
+        raise CatalogError(f"trackers/{structure.tracker}.cl: {message}")
+    state |= dict(structure.tracker_state)
     lines = ["typedef struct {"]
     for name, kind in (state or {"unused": "index"}).items():
         scalar, bracket, count = kind.partition("[")
         lines.append(f"    {scalar} {name}{bracket}{count};")
-    lines += ["} State;", "static void merge_state(State *into, const State *from, const mask where)", "{"]
-    # Arrays are scratch that a sample fills as it goes: there is nothing to take over at its start.
-    taken = [name for name, kind in state.items() if "[" not in kind]
-    lines += [f"    into->{name} = choose(where, from->{name}, into->{name});" for name in taken]
-    return [*lines, "}"]
+    lines += [
+        "} State;",
+        "static void merge_state(State *into, const State *from, const mask where)",
+    ]
+    # arrays are scratch that a sample fills as it goes: there is nothing to take over at its start
+    merged = [name for name, kind in state.items() if "[" not in kind]
+    merges = [f"    into->{name} = choose(where, from->{name}, into->{name});" for name in merged]
+    return [*lines, "{", *merges, "}"]
 
 
-def numbers_of(structure: Structure, box, medium: dict, majorant: dict, tracker: dict) -> list[float]:
+def numbers_of(
+    structure: Structure,
+    box: list[float],
+    medium: dict[str, float],
+    majorant: dict[str, float],
+    tracker: dict[str, float],
+) -> list[float]:
     """The values of the kernel's Numbers, in the order in which compose declares them."""
     values = [*box, *(medium[name] for name in structure.medium_numbers)]
     if "majorant" in structure.needs:

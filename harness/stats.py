@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats as distributions
+from scipy import special
 
 CONFIDENCE = 0.95
-_Z = float(distributions.norm.ppf(0.5 + CONFIDENCE / 2))
+SIGNIFICANT = 4.0
+"""Standard deviations beyond which the biases of single rays are more than the noise in them."""
+SIX = 6.0
+"""Standard errors beyond which what claims to be unbiased is not: by chance 2 in 1e9."""
+RARE = 20.0
+"""Events of which none is seen when so many are expected: exp(-20) = 2e-9, about as rare as SIX."""
 
 
 @dataclass(frozen=True)
 class Moments:
-    """Count, mean and sum of squared deviations of the scores of each ray; float64 arrays (rays,)."""
+    """Count, mean and sum of squared deviations of the scores of each ray, float64 (rays,)."""
 
     count: int
     mean: np.ndarray
@@ -30,75 +36,101 @@ class Moments:
 
     @property
     def variance(self) -> np.ndarray:
-        """Unbiased variance of one sample, per ray; needs two samples."""
+        """Unbiased variance of one sample, per ray (rays,); needs a count of two."""
         return self.m2 / (self.count - 1)
 
 
 def merge_blocks(mean: np.ndarray, m2: np.ndarray, samples: int) -> Moments:
     """Merge blocks of equally many samples; mean and m2 have the shape (blocks, rays)."""
     mean, m2 = mean.astype(np.float64), m2.astype(np.float64)
-    merged = mean.mean(0)
-    within = m2.sum(0)
+    # from the first block on, or rounding would give blocks that are all alike a variance
+    merged = mean[0] + (mean - mean[0]).mean(0)
     between = samples * ((mean - merged) ** 2).sum(0)
-    return Moments(samples * len(mean), merged, within + between)
+    return Moments(samples * len(mean), merged, m2.sum(0) + between)
 
 
-def relative_half_width(values: list[float]) -> float:
-    """Half the 95 % interval of the mean of independent values, relative to it; inf below two."""
+def relative_half_width(values: Sequence[float]) -> float:
+    """Half the 95 % interval of the mean of independent values, relative to it; inf below two.
+
+    Student's t; 0 where all values are the same.
+    """
     if len(values) < 2:
         return math.inf
-    mean = float(np.mean(values))
-    spread = float(np.std(values, ddof=1))
-    if spread == 0:
+    mean, spread = float(np.mean(values)), float(np.std(values, ddof=1))
+    if min(values) == max(values):
         return 0.0
-    quantile = float(distributions.t.ppf(0.5 + CONFIDENCE / 2, len(values) - 1))
+    quantile = float(special.stdtrit(len(values) - 1, 0.5 + CONFIDENCE / 2))
     return quantile * spread / math.sqrt(len(values)) / abs(mean) if mean else math.inf
 
 
 @dataclass(frozen=True)
 class Accuracy:
-    """How an estimate stands to its reference. All are of one sample per ray, averaged over rays."""
+    """How an estimate stands to its reference; of one sample a ray, averaged over rays."""
 
     estimate: float
     reference: float
     bias: float
     bias_stderr: float
-    z_score: float | None
-    """None where the estimator has no variance, so that no standard error is there to divide by."""
     bias_rms: float
     variance: float
+    samples: int
+    """Of all rays together."""
+
+    @property
+    def z_score(self) -> float | None:
+        """The bias in standard errors; None for an estimator without variance, which has none."""
+        return self.bias / self.bias_stderr if self.bias_stderr > 0 else None
 
     @property
     def rmse(self) -> float:
         """Root mean square error of one sample."""
         return math.sqrt(self.variance + self.bias_rms**2)
 
-    def time_to(self, relative_error: float, time_per_sample: float) -> float:
-        """Device seconds a ray until the relative RMSE falls below an error; inf if it never does.
+    @property
+    def unseen(self) -> bool:
+        """Whether all scores were 0 and should not be on average: their variance is unknown."""
+        return self.estimate == 0 == self.variance and self.reference != 0
 
-        Solves RMSE(t)^2 = bias^2 + variance * time_per_sample / t; one sample is the least.
+    def contradicted(self, largest: float, rounding: float) -> bool:
+        """Whether scores of at most `largest` cannot have the reference as their expectation.
+
+        They must be off by more than SIX standard errors and the arithmetic's relative rounding.
+        Where high scores are rare (a transmittance of 1e-20), scores and their variance may be 0
+        for a million samples, which says nothing: what is missing must then amount to RARE scores.
         """
+        off = abs(self.bias) - rounding * abs(self.reference)
+        if self.variance == 0 and self.estimate != 0:
+            return off > 0
+        missing = abs(self.bias) * self.samples / largest
+        return missing > RARE and off > SIX * self.bias_stderr
+
+    def time_to(self, relative_error: float, time_per_sample: float) -> float | None:
+        """Device seconds a ray until the relative RMSE falls to an error; inf if it never does.
+
+        Solves RMSE(t)^2 = bias^2 + variance * time_per_sample / t; one sample is the least. None
+        where the variance is unknown.
+        """
+        if self.unseen:
+            return None
         room = (relative_error * self.reference) ** 2 - self.bias_rms**2
-        if room <= 0:
-            return math.inf
-        return time_per_sample * max(1.0, self.variance / room)
+        if self.variance == 0:
+            return time_per_sample if room >= 0 else math.inf
+        return time_per_sample * max(1.0, self.variance / room) if room > 0 else math.inf
 
 
 def accuracy(moments: Moments, reference: np.ndarray) -> Accuracy:
-    """Compare the merged moments of all rounds with the float64 reference of each ray."""
+    """Compare the merged moments of all rounds with the float64 reference of each ray (rays,)."""
     rays = len(moments.mean)
     error_of_mean = moments.variance / moments.count
     deviation = moments.mean - reference
-    bias = float(deviation.mean())
-    stderr = math.sqrt(float(error_of_mean.sum())) / rays
     return Accuracy(
         estimate=float(moments.mean.mean()),
         reference=float(reference.mean()),
-        bias=bias,
-        bias_stderr=stderr,
-        z_score=bias / stderr if stderr > 0 else None,
+        bias=float(deviation.mean()),
+        bias_stderr=math.sqrt(float(error_of_mean.sum())) / rays,
         bias_rms=_significant_bias(deviation, error_of_mean),
         variance=float(moments.variance.mean()),
+        samples=rays * moments.count,
     )
 
 
@@ -106,8 +138,8 @@ def _significant_bias(deviation: np.ndarray, error_of_mean: np.ndarray) -> float
     """Root mean square over rays of the bias, its noise taken out; 0 where noise explains it.
 
     E[deviation^2] = bias^2 + error_of_mean. Of an unbiased estimator the difference has a standard
-    deviation of at least sqrt(2 sum error^2) / rays: what is below four of them counts as none.
+    deviation of about sqrt(2 sum error_of_mean^2) / rays.
     """
     excess = float((deviation**2 - error_of_mean).mean())
     noise = math.sqrt(2 * float((error_of_mean**2).sum())) / len(deviation)
-    return math.sqrt(excess) if excess > 4 * noise else 0.0
+    return math.sqrt(excess) if excess > SIGNIFICANT * noise else 0.0

@@ -1,64 +1,103 @@
-"""Runs the cases of a plan on devices, medium by medium, and writes their rows."""
+"""Runs the cases of a plan on a device, medium by medium, and writes their rows."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
-
 from freepath import majorants, source
 from freepath.catalog import Catalog
-from freepath.device import Device, Program
-from freepath.errors import BuildError, RunError
-from freepath.kernel_files import split_front_matter
-from freepath.measure import Bench, Rule, interleave
+from freepath.device import Device, Program, scalar_type
+from freepath.errors import BuildError, FreepathError, RunError
+from freepath.majorants import Majorant
+from freepath.measure import Bench, interleave
 from freepath.plan import Case
-from freepath.results import ResultFolder, key_of
+from freepath.results import ResultFolder
 from freepath.rows import base_row, effects_of, measured_row, round_rows
-from freepath.runner import KernelData, Round, Runner
+from freepath.runner import KernelData, Runner
 from freepath.scene import Medium, make_rays, reference, segments
 from freepath.source import Source, Structure
+from freepath.stopping import Rule
 
-
-@dataclass
-class Job:
-    """A case on a device: its row so far, its sources, and its bench once it is built."""
-
-    case: Case
-    row: dict[str, Any]
-    structure: Structure | None = None
-    sources: dict[bool, Source] = field(default_factory=dict)
-    """By whether they count."""
-    bench: Bench | None = None
+REASON_LENGTH = 300
 
 
 @dataclass(frozen=True)
 class Scene:
-    """A medium with the rays that fly through it; segments as scene.segments gives them."""
+    """A medium with the rays that fly through it; what is dear to derive from them is kept."""
 
     medium: Medium
     segments: np.ndarray
+    """(rays, 7), as scene.segments gives them."""
+    _kept: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
 
     @classmethod
-    def of(cls, case: Case, medium: Medium, search_path: list) -> Scene:
+    def of(cls, case: Case, medium: Medium, search_path: Iterable[str | Path]) -> Scene:
         """Make the rays of a case in its medium."""
         origins, directions = make_rays(case.rays, medium, case.seed, search_path)
         return cls(medium, segments(origins, directions, medium))
 
+    def _keep(self, key: Any, make: Callable[[], Any]) -> Any:
+        if key not in self._kept:
+            self._kept[key] = make()
+        return self._kept[key]
+
+    @property
+    def fingerprint(self) -> str:
+        """Identifies the medium and the rays."""
+        return self._keep(
+            "fingerprint",
+            lambda: source.combined_hash(self.medium.fingerprint, self.segments.tobytes()),
+        )
+
+    def reference(self, estimand: str) -> np.ndarray:
+        """The exact value of an estimand for each ray (rays,)."""
+        return self._keep(estimand, lambda: reference(estimand, self.medium, self.segments))
+
+    def bounds(self, cells: tuple[int, int, int]) -> tuple[np.ndarray, np.ndarray]:
+        """The tightest minorant and majorant of each cell, [nz, ny, nx]."""
+        return self._keep(cells, lambda: self.medium.bounds(cells))
+
+    def majorant(self, case: Case, *, controlled: bool) -> Majorant:
+        """The majorant of a case, and the control that a controlled tracker splits off.
+
+        Without numbers for a tracker that uses none.
+        """
+        if case.majorant is None:
+            return Majorant({})
+        bounds = self.bounds(majorants.cells_of(case.majorant))
+        control = case.params if controlled else None
+        return majorants.build(case.majorant, self.medium, bounds, case.tightness, control)
+
+    def largest_score(self, estimand: str) -> float:
+        """What no score exceeds as long as weights stay below 1."""
+        if estimand == "transmittance":
+            return 1.0
+        if estimand == "free_path":
+            return float(self.segments[:, 6].max())
+        return float(self.bounds((1, 1, 1))[1].max())
+
 
 def structure_of(
-    case: Case, catalog: Catalog, medium: Medium, device: Device, *, count: bool, record: bool = False
+    case: Case,
+    catalog: Catalog,
+    medium: Medium,
+    device: Device,
+    *,
+    count: bool,
+    record: bool = False,
 ) -> Structure:
     """Decide what the source of a case consists of."""
     tracker = catalog.trackers[case.tracker]
-    _, code = split_front_matter(tracker.source, f"{tracker.name}.cl")
     parameters = [(name, p) for name, p in tracker.parameters.items() if not p.host]
     choices = [(name, p.choices) for name, p in parameters if p.choices is not None]
+    majorant = case.majorant.kind if case.majorant else None
     return Structure(
         tracker=tracker.name,
-        tracker_code=code,
+        tracker_code=tracker.code,
         needs=tracker.needs,
         tracker_numbers=tuple(name for name, p in parameters if p.choices is None),
         tracker_state=tuple(tracker.state.items()),
@@ -66,7 +105,7 @@ def structure_of(
         estimand=case.estimand,
         medium=medium.kernel,
         medium_numbers=tuple(medium.numbers),
-        majorant=case.majorant.kind if case.majorant else None,
+        majorant=majorant,
         majorant_numbers=majorants.numbers_of(case.majorant, tracker.needs),
         lanes=device.info.lanes if case.lanes == "auto" else int(case.lanes),
         arithmetic=case.arithmetic,
@@ -80,141 +119,169 @@ def runner_of(
     case: Case, structure: Structure, scene: Scene, program: Program, data: KernelData
 ) -> Runner:
     """Bind a built program to the numbers and the majorant of a case."""
-    majorant = majorants.Majorant({})
-    if case.majorant:
-        control = case.params if "control" in structure.needs else None
-        majorant = majorants.build(case.majorant, scene.medium, case.tightness, control)
-    medium = scene.medium
+    controlled = "control" in structure.needs
+    medium, majorant = scene.medium, scene.majorant(case, controlled=controlled)
     numbers = source.numbers_of(
         structure, medium.extent.tolist(), medium.numbers, majorant.numbers, dict(case.params)
     )
-    arguments = (majorant.data, case.arithmetic, structure.lanes, case.seed)
-    return Runner(program, data, numbers, *arguments)
+    # cases that share a majorant and a control share their buffer
+    control = tuple(sorted(case.params.items())) if controlled else None
+    buffer = data.keep((case.majorant, case.tightness, control), majorant.data)
+    uploaded = program.device.upload(np.array(numbers, scalar_type(case.arithmetic)))
+    fixed = case.arithmetic, structure.lanes, case.seed
+    return Runner(program, data, uploaded, buffer, *fixed)
 
 
+@dataclass(eq=False)
+class Job:
+    """A case on a device: its row so far, its sources, and its bench once it is built."""
+
+    case: Case
+    row: dict[str, Any]
+    structure: Structure | None = None
+    timed: Source | None = None
+    """None where the case is skipped."""
+    counting: Source | None = None
+    bench: Bench | None = None
+
+
+@dataclass
 class Sweep:
     """Cases on one device, writing into one folder."""
 
-    def __init__(
-        self,
-        device: Device,
-        catalog: Catalog,
-        folder: ResultFolder,
-        run_id: str,
-        on_done: Callable[[dict[str, Any]], None],
-        on_progress: Callable[[float], None],
-    ):
-        self.device = device
-        self.folder = folder
-        self.time_build_s = 0.0
-        self._catalog = catalog
-        self._run_id = run_id
-        self._on_done = on_done
-        self._on_progress = on_progress
-        self._programs: dict[str, Program] = {}
+    device: Device
+    catalog: Catalog
+    folder: ResultFolder
+    run_id: str
+    on_done: Callable[[dict[str, Any]], None]
+    """Told every row once it is written."""
+    on_progress: Callable[[float, str], None]
+    """Told how many cases' worth is under way, and what is being done."""
+    time_build_s: float = 0.0
+    _programs: dict[str, Program | BuildError] = field(default_factory=dict)
 
     def plan(self, case: Case, scene: Scene) -> Job:
         """Compose a case's sources, so that what would run is known before anything is built."""
-        row = base_row(case, self.device.info, self._run_id)
+        row = base_row(case, self.device.info, self.run_id)
         row["effects"] = effects_of(case, scene.medium.kernel)
-        row["config_sha256"] = source.combined_hash(
-            case.config_sha256, scene.medium.fingerprint, scene.segments.tobytes()
-        )
-        job = Job(case, row)
+        row["rays"] = len(scene.segments)
+        row["config_sha256"] = source.combined_hash(case.config_sha256, scene.fingerprint)
         if case.arithmetic == "double" and not self.device.info.fp64:
             row["reason"] = row["reason"] or "the device has no double precision"
-        if row["reason"]:
-            row["source_sha256"] = ""
-            return job
-        for count in (False, True):
-            job.structure = structure_of(
-                case, self._catalog, scene.medium, self.device, count=count
-            )
-            job.sources[count] = source.compose(job.structure)
-        row["source_sha256"] = job.sources[False].sha256
+        row["reason"] = row["reason"] or self._control_reason(case, scene)
+        job = Job(case, row)
+        if not row["reason"]:
+            job.structure = self._structure(case, scene, count=False)
+            job.timed = source.compose(job.structure)
+            job.counting = source.compose(self._structure(case, scene, count=True))
+            if self.device.info.slow_compiler:
+                job.counting = job.counting.unoptimised()
+            row["source_sha256"] = job.timed.sha256
         return job
+
+    def _control_reason(self, case: Case, scene: Scene) -> str:
+        """Why a tracker cannot take its control; '' where it can."""
+        tracker = self.catalog.trackers[case.tracker]
+        if "control" not in tracker.needs or tracker.bounding is not True:
+            return ""
+        excess = scene.majorant(case, controlled=True).control_excess
+        if excess <= majorants.EXCESS:
+            return ""
+        share = f"{case.params['share']:g} x {case.params['control']}"
+        return f"{case.tracker} allows no control above the extinction, and {share} is somewhere"
+
+    def _structure(self, case: Case, scene: Scene, *, count: bool) -> Structure:
+        return structure_of(case, self.catalog, scene.medium, self.device, count=count)
 
     def run(self, scene: Scene, jobs: list[Job], seed: int) -> None:
         """Build and measure the jobs of one scene side by side; each row is written as it ends."""
         for job in jobs:
-            if not job.sources:
+            if job.timed is None:
                 self._finish(job, job.row)
-        data = {
-            arithmetic: KernelData.upload(
-                self.device, scene.segments, scene.medium.data, arithmetic
-            )
-            for arithmetic in {job.case.arithmetic for job in jobs if job.sources}
-        }
-        for job in jobs:
-            if job.sources:
-                self._guarded(job, lambda job=job: self._prepare(job, scene, data))
-        benches = {i: job.bench for i, job in enumerate(jobs) if job.bench}
-        self._measure(jobs, benches, scene, seed)
-
-    def _measure(self, jobs: list[Job], benches: dict[int, Bench], scene: Scene, seed: int) -> None:
-        def on_round(key: int, one: Round) -> None:
-            self._on_progress(sum(b.progress for b in benches.values() if not b.measurement.stopped))
-
-        for key in interleave(benches, seed, on_round, self._failed(jobs, benches)):
-            job = jobs[key]
-            values = reference(job.case.estimand, scene.medium, scene.segments)
-            tracker = self._catalog.trackers[job.case.tracker]
-            found = job.bench.measurement
-            row = measured_row(job.row, tracker, found, values, job.bench.timed.lanes)
-            self._finish(job, row, list(round_rows(row, found)))
-
-    def _failed(self, jobs: list[Job], benches: dict[int, Bench]):
-        def on_error(key: int, error: RunError) -> None:
-            job = jobs[key]
-            self._finish(job, job.row | {"status": "run_failed", "reason": _first_line(error)})
-
-        return on_error
-
-    def _guarded(self, job: Job, work: Callable[[], None]) -> None:
-        """A case that cannot be built or run is a row; the others go on."""
-        try:
-            work()
-        except BuildError as error:
-            log = self.folder.folder / f"build-{job.case.case_id}.log"
-            log.write_text(str(error), encoding="utf-8")
-            self._finish(job, job.row | {"status": "build_failed", "reason": _first_line(error)})
-        except RunError as error:
-            self._finish(job, job.row | {"status": "run_failed", "reason": _first_line(error)})
+        jobs = [job for job in jobs if job.timed is not None]
+        data: dict[str, KernelData] = {}
+        for place, job in enumerate(jobs, 1):
+            self.on_progress(0.0, f"building {place}/{len(jobs)}")
+            try:
+                self._prepare(job, scene, data)
+            except (BuildError, RunError) as error:
+                self._fail(job, error)
+        self._measure([job for job in jobs if job.bench], scene, seed)
 
     def _prepare(self, job: Job, scene: Scene, data: dict[str, KernelData]) -> None:
-        case = job.case
-        runners = {}
-        for count, text in job.sources.items():
-            program = self._program(text, job)
-            runners[count] = runner_of(case, job.structure, scene, program, data[case.arithmetic])
-        stop = case.stop
+        case, stop = job.case, job.case.stop
+        job.row["time_build_s"] = 0.0
+        programs = [self._program(job, text) for text in (job.timed, job.counting)]
+        if case.arithmetic not in data:
+            medium = scene.medium.data
+            uploaded = KernelData.upload(self.device, scene.segments, medium, case.arithmetic)
+            data[case.arithmetic] = uploaded
+        timed, counting = (
+            runner_of(case, job.structure, scene, program, data[case.arithmetic])
+            for program in programs
+        )
         rule = Rule(stop.error, stop.time_noise, stop.at_most, stop.samples)
-        lanes_in_all = self.device.work_items[0] * job.structure.lanes
-        bench = Bench(runners[True], runners[False], rule, lanes_in_all)
+        bench = Bench(timed, counting, rule)
         bench.prepare()
-        job.row["time_build_s"] = (job.row["time_build_s"] or 0.0) + bench.time_compile_s
-        self.time_build_s += bench.time_compile_s
+        self._add_build(job, bench.measurement.time_compile_s)
         job.bench = bench
 
-    def _program(self, text: Source, job: Job) -> Program:
+    def _program(self, job: Job, text: Source) -> Program:
         """Build each source once; a case that shares it with another took no time to build."""
         if text.sha256 not in self._programs:
-            self._programs[text.sha256] = program = self.device.build(text)
-            job.row["time_build_s"] = (job.row["time_build_s"] or 0.0) + program.time_build_s
-            self.time_build_s += program.time_build_s
-        return self._programs[text.sha256]
+            try:
+                program = self.device.build(text)
+            except BuildError as error:
+                self._programs[text.sha256] = error
+                log = self.folder.write_log(f"build-{text.sha256[:12]}.log", str(error))
+                raise BuildError(f"{first_error(error)} (all of it in {log.name})") from error
+            self._programs[text.sha256] = program
+            self._add_build(job, program.time_build_s)
+        found = self._programs[text.sha256]
+        if isinstance(found, BuildError):
+            raise found
+        return found
 
-    def _finish(self, job: Job, row: dict[str, Any], rounds: list[dict[str, Any]] = ()) -> None:
+    def _add_build(self, job: Job, seconds: float) -> None:
+        job.row["time_build_s"] += seconds
+        self.time_build_s += seconds
+
+    def _measure(self, jobs: list[Job], scene: Scene, seed: int) -> None:
+        by_bench = {job.bench: job for job in jobs}
+        self.on_progress(0.0, "computing references")
+        for job in jobs:
+            scene.reference(job.case.estimand)  # now, and not between two rounds
+
+        def on_error(bench: Bench, error: RunError) -> None:
+            self._fail(by_bench[bench], error)
+
+        for bench in interleave(by_bench, seed, on_error):
+            if bench.measurement.stopped:
+                self._measured(by_bench[bench], scene)
+            open_ones = [b for b in by_bench if not b.measurement.stopped]
+            self.on_progress(
+                sum(b.progress for b in open_ones), f"measuring {len(open_ones)} cases"
+            )
+
+    def _measured(self, job: Job, scene: Scene) -> None:
+        estimand, found = job.case.estimand, job.bench.measurement
+        tracker = self.catalog.trackers[job.case.tracker]
+        values, largest = scene.reference(estimand), scene.largest_score(estimand)
+        row = measured_row(job.row, tracker, found, values, largest)
+        self._finish(job, row, round_rows(row, found))
+
+    def _fail(self, job: Job, error: FreepathError) -> None:
+        """A case that cannot be built or run is a row; the others go on."""
+        status = "build_failed" if isinstance(error, BuildError) else "run_failed"
+        self._finish(job, job.row | {"status": status, "reason": first_error(error)})
+
+    def _finish(self, job: Job, row: dict[str, Any], rounds: Iterable[dict[str, Any]] = ()) -> None:
         self.folder.append(row, rounds)
-        self._on_done(row)
+        self.on_done(row)
 
 
-def _first_line(error: Exception) -> str:
-    lines = [line.strip() for line in str(error).splitlines() if "error" in line.lower()]
-    return (lines or [str(error)])[0][:300]
-
-
-def pending(folder: ResultFolder, jobs: list[Job]) -> list[Job]:
-    """The jobs whose row an earlier, interrupted run has not left in the folder."""
-    done = folder.keep({key_of(job.row) for job in jobs})
-    return [job for job in jobs if key_of(job.row) not in done]
+def first_error(error: Exception) -> str:
+    """The line of a compiler's log or a driver's message that says what is wrong."""
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    naming = [line for line in lines if "error:" in line.lower()]
+    return (naming or lines)[0][:REASON_LENGTH]

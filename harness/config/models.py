@@ -221,7 +221,9 @@ class Octree(Kind):
     """A majorant for each leaf of an octree, which joins cells of like majorants."""
 
     kind: ClassVar[str] = "octree"
-    resolution: Annotated[int, Number("count", minimum=2, maximum=512), AfterValidator(_power_of_two)]
+    resolution: Annotated[
+        int, Number("count", minimum=2, maximum=512), AfterValidator(_power_of_two)
+    ]
     """Finest cells along each side, a power of two."""
     slack: Annotated[float, Number(minimum=0)] = 0.25
     """Eight leaves are joined if that raises the integral of the majorant by at most so much."""

@@ -58,9 +58,11 @@ def convert(text: str, unit: str) -> float | None:
     match = re.fullmatch(QUANTITY_PATTERN, text)
     if not match or not UNITS[unit].base:
         return None
+    name = re.sub(r"^/", "1/", match[2])
+    if name == UNITS[unit].base:
+        return float(match[1])
     import pint
 
-    name = re.sub(r"^/", "1/", match[2])
     try:
         factor = _registry().Quantity(1.0, _registry().parse_units(name)).to(UNITS[unit].base)
     except (pint.PintError, ValueError):

@@ -109,12 +109,12 @@ class Stop(Model):
     """When a case has been measured well enough: both precisions reached, or the time is up."""
 
     error: Fraction = 0.01
-    """Relative standard error of the estimate."""
+    """Half-width of the 95 % interval of the RMSE of one sample, relative to it."""
     time_noise: Fraction = 0.02
-    """Relative half-width of the confidence interval of the time."""
+    """Half-width of the 95 % interval of the time of one sample, relative to it."""
     at_most: Annotated[float, Number("time", above=0)] = 10.0
     """Seconds of measuring for one case."""
-    samples: Annotated[int, Number("count", minimum=1)] | None = None
+    samples: Annotated[int, Number("count", minimum=2)] | None = None
     """Exactly so many samples for each ray, instead of the rules above."""
 
 

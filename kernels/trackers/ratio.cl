@@ -16,5 +16,8 @@ static void step(Path *path, const Scene *scene, Rng *rng)
 {
     const mask here = next_tentative(path, scene, rng);
     const real sigma_n = path->majorant - sigma_t_at_tentative(path, scene, here);
-    path->weight = choose(here, path->weight * sigma_n * path->mean_free_path, path->weight);
+    /* A quotient, not a product with mean_free_path: it is exactly 1 in empty space and exactly 0 where the
+       majorant is met, and its rounding has no sign that many collisions would add up. */
+    const real null = sigma_n / path->majorant;
+    path->weight = choose(here, path->weight * null, path->weight);
 }

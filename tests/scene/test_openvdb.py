@@ -1,0 +1,218 @@
+import importlib.util
+import struct
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import OpenImageIO
+import pytest
+from freepath.errors import VolumeError
+from freepath.scene import build_medium, openvdb, openvdb_header, openvdb_reader
+
+from scene.helpers import volume_model
+
+MAKE_GRIDS = """
+import sys
+import numpy as np
+import pyopenvdb as vdb
+
+densities = np.arange(5 * 7 * 9, dtype=np.float32).reshape(5, 7, 9)
+density = vdb.FloatGrid()
+density.name = "density"
+density.copyFromArray(densities, ijk=(-3, 2, 10))
+density.transform = vdb.createLinearTransform(
+    [[0, 0.25, 0, 0], [-0.5, 0, 0, 0], [0, 0, 2, 0], [1, 2, 3, 1]]
+)
+tiles = vdb.FloatGrid()
+tiles.name = "tiles"
+tiles.fill((0, 0, 0), (15, 15, 15), 2.5)
+tiles.prune()
+tiles.fill((17, 0, 0), (18, 1, 1), 1.0)
+velocity = vdb.Vec3SGrid()
+velocity.name = "velocity"
+velocity.fill((0, 0, 0), (3, 3, 3), (1, 2, 3))
+empty = vdb.FloatGrid()
+empty.name = "empty"
+frustum = vdb.FloatGrid()
+frustum.name = "frustum"
+frustum.copyFromArray(densities)
+frustum.transform = vdb.createFrustumTransform((0, 0, 0), (10, 10, 10), 0.5, 10.0)
+folder = sys.argv[1]
+vdb.write(folder + "/many.vdb", grids=[density, tiles, velocity, empty])
+vdb.write(folder + "/one.vdb", grids=[tiles])
+vdb.write(folder + "/vectors.vdb", grids=[velocity])
+vdb.write(folder + "/unclear.vdb", grids=[tiles, empty])
+vdb.write(folder + "/frustum.vdb", grids=[frustum])
+"""
+
+READERS = ("read_with_openvdb", "read_with_openimageio")
+
+
+def run(code, *arguments):
+    command = [openvdb.SYSTEM_PYTHON, "-I", "-c", code, *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+@pytest.fixture(scope="module")
+def grids(tmp_path_factory):
+    """Return a folder with OpenVDB files, written by Debian's python3-openvdb."""
+    folder = tmp_path_factory.mktemp("grids")
+    if not Path(openvdb.SYSTEM_PYTHON).exists() or run("import pyopenvdb").returncode:
+        pytest.skip("python3-openvdb is not installed")
+    done = run(MAKE_GRIDS, folder)
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+@pytest.fixture(params=READERS)
+def one_reader(request, monkeypatch, tmp_path):
+    """Read OpenVDB files by one reader alone, in a process of the system's Python."""
+    module = "pyopenvdb" if request.param == "read_with_openvdb" else "OpenImageIO"
+    if run(f"import {module}").returncode:
+        pytest.skip(f"the system's Python has no {module}")
+    other = next(name for name in READERS if name != request.param)
+    script = tmp_path / "one_reader.py"
+    text = Path(openvdb_reader.__file__).read_text()
+    silenced = f"def {other}(*_):\n    return None\n\n\ndef unused(path, grid):"
+    script.write_text(text.replace(f"def {other}(path, grid):", silenced))
+    monkeypatch.setattr(openvdb, "_read_here", lambda *_: None)
+    monkeypatch.setattr(openvdb_reader, "__file__", str(script))
+
+
+@pytest.mark.usefixtures("one_reader")
+class TestBothReaders:
+    def test_densities_and_transform(self, grids):
+        densities, to_world = openvdb.read_openvdb(grids / "many.vdb", None)
+        expected = np.arange(5 * 7 * 9).reshape(5, 7, 9).transpose(2, 1, 0)
+        assert densities.tolist() == expected.tolist()
+        # the centre of the first voxel is index (-3, 2, 10); i goes along y, j against x
+        first = to_world @ [0.5, 0.5, 0.5, 1.0]
+        assert first.tolist() == [1 - 2 * 0.5, 2 - 3 * 0.25, 3 + 10 * 2]
+        assert to_world[:, :3].tolist() == [[0, -0.5, 0], [0.25, 0, 0], [0, 0, 2]]
+
+    def test_a_grid_by_name_with_constant_tiles(self, grids):
+        for file, name in [("many.vdb", "tiles"), ("one.vdb", None)]:
+            densities, _ = openvdb.read_openvdb(grids / file, name)
+            expected = np.zeros((16, 16, 19))
+            expected[:, :, :16] = 2.5
+            expected[:2, :2, 17:] = 1.0
+            assert densities.tolist() == expected.tolist()
+
+    @pytest.mark.parametrize(
+        ("file", "grid", "message"),
+        [
+            ("many.vdb", "smoke", "no grid 'smoke' of scalars, expected one of: density, empty, t"),
+            ("many.vdb", "velocity", "no grid 'velocity' of scalars"),
+            ("many.vdb", "empty", "the grid is empty: it has no active voxels"),
+            ("unclear.vdb", None, "it holds several grids, choose one of: empty, tiles"),
+            ("vectors.vdb", None, "it holds no grid of scalars"),
+            ("frustum.vdb", None, "frustum transform, expected"),
+            ("damaged.vdb", None, "it is not an OpenVDB file, or a truncated one: "),
+        ],
+    )
+    def test_refusals(self, grids, file, grid, message):
+        content = (grids / "one.vdb").read_bytes()
+        (grids / "damaged.vdb").write_bytes(content.replace(b"ScaleMap", b"Scal\0\nap"))
+        with pytest.raises(VolumeError) as error:
+            openvdb.read_openvdb(grids / file, grid)
+        text = str(error.value)
+        assert text.startswith(f"{grids / file}: ")
+        assert message in text
+        assert text.isprintable()
+
+    def test_too_many_voxels(self, grids):
+        script = Path(openvdb_reader.__file__)
+        script.write_text(script.read_text().replace("2**31 - 1", "314"))
+        with pytest.raises(VolumeError, match="the grid has 315 voxels, expected at most 314"):
+            openvdb.read_openvdb(grids / "many.vdb", "density")
+
+    def test_the_real_cloud_is_its_npy_voxel_for_voxel(self, real_volumes):
+        densities, to_world = openvdb.read_openvdb(real_volumes / "wdas_cloud_sixteenth.vdb", None)
+        expected = np.load(real_volumes / "cloud_wdas16.npy")
+        assert densities.dtype == expected.dtype
+        assert np.array_equal(densities, expected)
+        size = 10.0 / 3.0
+        np.testing.assert_allclose(to_world[:, :3], np.eye(3) * size, rtol=1e-6)
+        np.testing.assert_allclose(to_world[:, 3] / size, [-66.5, -21.5, -90.5], rtol=1e-6)
+
+
+def test_a_file_that_is_cut_anywhere_is_refused(grids, tmp_path, monkeypatch):
+    # before OpenVDB sees it, which may run for minutes on what lies beyond the end
+    monkeypatch.setattr(openvdb, "_read_here", lambda *_: pytest.fail("read a truncated file"))
+    content = (grids / "many.vdb").read_bytes()
+    path = tmp_path / "cut.vdb"
+    for size in [*range(9, len(content), 101), len(content) - 1]:
+        path.write_bytes(content[:size])
+        with pytest.raises(VolumeError, match="cut.vdb: is truncated, its grids go on beyond"):
+            openvdb.read_openvdb(path, None)
+
+
+def test_what_is_no_openvdb_file_is_refused(tmp_path):
+    (tmp_path / "v.vdb").write_text("this is not a volume")
+    with pytest.raises(VolumeError, match="v.vdb: is not an OpenVDB file"):
+        openvdb.read_openvdb(tmp_path / "v.vdb", None)
+
+
+@pytest.fixture
+def stub(tmp_path):
+    """Return a file that is OpenVDB by its header, and holds no grid."""
+    path = tmp_path / "v.vdb"
+    path.write_bytes(struct.pack("<qIII?36sII", openvdb_header.MAGIC, 224, 9, 1, True, b"", 0, 0))
+    return path
+
+
+def test_a_medium_from_openvdb_is_where_the_file_says(grids):
+    medium = build_medium(volume_model(grids / "many.vdb", sigma_t=2.0))
+    corners = medium.world_box()
+    # voxel edges, half a voxel before the first centre: x = 1 - 0.5 j, y = 2 + 0.25 i, z = 3 + 2 k
+    assert corners.min(axis=0).tolist() == [1 - 0.5 * 8.5, 2 + 0.25 * -3.5, 3 + 2 * 9.5]
+    assert corners.max(axis=0).tolist() == [1 - 0.5 * 1.5, 2 + 0.25 * 1.5, 3 + 2 * 18.5]
+    # index (-3, 2, 10) holds 0, (-2, 2, 10) holds 63
+    second = np.array([1 - 0.5 * 2, 2 + 0.25 * -2, 3 + 2 * 10])
+    position = medium.to_medium @ np.append(second, 1.0)
+    assert medium.sigma_t(position[None])[0] == 126.0
+
+
+def test_the_two_files_of_the_real_cloud_make_the_same_medium(real_volumes, grids):
+    unit = volume_model("wdas_cloud_sixteenth.vdb", sigma_t=40.0, voxel_size=(1.0, 1.0, 1.0))
+    from_vdb = build_medium(unit, [real_volumes])
+    from_npy = build_medium(volume_model("cloud_wdas16.npy", sigma_t=40.0), [real_volumes])
+    assert from_vdb.fingerprint == from_npy.fingerprint
+    assert from_npy.extent.tolist() == [126.0, 86.0, 154.0]
+
+
+def test_without_a_reader_the_packages_to_install_are_named(stub, monkeypatch):
+    monkeypatch.setattr(openvdb, "_read_here", lambda *_: None)
+    monkeypatch.setattr(openvdb, "interpreters", list)
+    with pytest.raises(VolumeError) as error:
+        openvdb.read_openvdb(stub, None)
+    text = str(error.value)
+    assert text.startswith(f"{stub}: nothing here reads OpenVDB")
+    assert "python3-openvdb" in text
+    assert "python3-openimageio" in text
+
+
+def test_a_python_without_a_reader_says_so(stub):
+    # this Python, whose OpenImageIO has no OpenVDB and which has no module of OpenVDB
+    if any(importlib.util.find_spec(name) for name in ("openvdb", "pyopenvdb")):
+        pytest.skip("this Python has a module of OpenVDB")
+    if "openvdb" in OpenImageIO.get_string_attribute("format_list"):
+        pytest.skip("this build of OpenImageIO reads OpenVDB")
+    assert openvdb._read_here(stub, None) is None
+    assert openvdb._read_there(sys.executable, stub, None) is None
+
+
+def test_a_reader_that_crashes_is_an_error(stub, monkeypatch):
+    monkeypatch.setattr(openvdb, "_read_here", lambda *_: None)
+    monkeypatch.setattr(openvdb, "interpreters", lambda: ["/bin/false"])
+    with pytest.raises(VolumeError, match="cannot be read: /bin/false failed with status 1"):
+        openvdb.read_openvdb(stub, None)
+
+
+def test_the_reader_needs_nothing_of_freepath():
+    assert "freepath" not in {
+        line.split()[1].split(".")[0]
+        for line in Path(openvdb_reader.__file__).read_text().splitlines()
+        if line.startswith(("import ", "from "))
+    }
