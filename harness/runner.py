@@ -72,7 +72,7 @@ class Round:
     moments: Moments | None
     """Per ray; let go of once it is merged with those of other rounds."""
     recorded: np.ndarray | None = None
-    """(units, samples, 4): t, weight, escaped, lookups so far in the unit; of recording kernels."""
+    """(units, samples, 5): t, weight, escaped, lookups so far in the unit, score."""
 
     @property
     def time_s(self) -> float:
@@ -169,7 +169,7 @@ class Runner:
         counters = self._read("counters", outputs, (units, len(COUNTERS)), np.uint32)
         recorded = None
         if record:
-            recorded = self._read("recorded", outputs, (units, samples, 4), self._scalar)
+            recorded = self._read("recorded", outputs, (units, samples, 5), self._scalar)
         return Round(
             samples=units * samples,
             estimate=float(moments.mean.mean()),
@@ -220,7 +220,7 @@ class Runner:
             "moments": units * 3 * scalar,
             "counters": units * 4 * len(COUNTERS),
             "iterations": work_items * 8,
-            "recorded": max(units * recorded * 4 * scalar, 8),
+            "recorded": max(units * recorded * 5 * scalar, 8),
         }
         return {name: self.data.output(name, size) for name, size in sizes.items()}
 

@@ -24,7 +24,8 @@ static void step(Path *path, const Scene *scene, Rng *rng)
 {
     const mask here = next_tentative(path, scene, rng);
     const real sigma_n = path->majorant - sigma_t_at_tentative(path, scene, here);
-    const real throughput = path->state.throughput * sigma_n * path->mean_free_path;
+    const real null = sigma_n / path->majorant;
+    const real throughput = path->state.throughput * null;
     path->state.throughput = choose(here, throughput, path->state.throughput);
     deposit(path, throughput * exp(path->depth - path->state.total), path->length, (mask)-1, here);
 }

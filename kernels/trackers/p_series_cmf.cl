@@ -42,7 +42,7 @@ static void step(Path *path, const Scene *scene, Rng *rng)
     escape(path, stopped);
     const mask here = path->live;
     const real sigma = sigma_t_at_tentative(path, scene, here);
-    const real null = (path->majorant - sigma) * path->mean_free_path;
+    const real null = (path->majorant - sigma) / path->majorant;
     state->term = choose(here, state->term * null, state->term);
     /* Past the mode a survivor keeps the mass of its predecessor; the probability has paid for the rest. */
     const mask grows = here & (~roulette | less((real)1, ratio));

@@ -28,7 +28,7 @@ static void step(Path *path, const Scene *scene, Rng *rng)
     mask controlled;
     const mask here = next_residual(path, scene, rng, &controlled);
     const real residual = sigma_t(path, scene, path->t, here) - path->state.control;
-    const real null = (path->majorant - residual) * path->mean_free_path;
+    const real null = (path->majorant - residual) / path->majorant;
     path->weight = choose(here, path->weight * null, path->weight);
     const mask left = before & ~path->live;
     if (any_lane(left))

@@ -15,7 +15,8 @@ static void step(Path *path, const Scene *scene, Rng *rng)
 {
     const mask here = next_tentative(path, scene, rng);
     const real sigma = sigma_t_at_tentative(path, scene, here);
-    const real share = path->weight * path->mean_free_path;
-    deposit(path, share * sigma, path->t, (mask)0, here);
-    path->weight = choose(here, share * (path->majorant - sigma), path->weight);
+    const real real_share = sigma / path->majorant;
+    const real null_share = (path->majorant - sigma) / path->majorant;
+    deposit(path, path->weight * real_share, path->t, (mask)0, here);
+    path->weight = choose(here, path->weight * null_share, path->weight);
 }

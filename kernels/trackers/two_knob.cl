@@ -28,6 +28,7 @@ static void step(Path *path, const Scene *scene, Rng *rng)
     const mask collided = here & less(uniform(rng) * both, acceptance * sigma);
     const real sign = choose(less(sigma_n, (real)0), (real)-1, (real)1);
     const real share = choose(collided, both / (acceptance > 0 ? acceptance : (SCALAR)1), sign * both);
-    path->weight = choose(here, path->weight * share * path->mean_free_path, path->weight);
+    const real relative = share / path->majorant;
+    path->weight = choose(here, path->weight * relative, path->weight);
     collide(path, collided);
 }

@@ -35,6 +35,7 @@ static void step(Path *path, const Scene *scene, Rng *rng)
     const mask collided = here & less(uniform(rng) * both, fabs(residual));
     const mask negative = choose(collided, less(residual, (real)0), less(null, (real)0));
     const real sign = choose(negative, (real)-1, (real)1);
-    path->weight = choose(here, path->weight * sign * both * path->mean_free_path, path->weight);
+    const real share = sign * both / path->majorant;
+    path->weight = choose(here, path->weight * share, path->weight);
     collide(path, collided);
 }

@@ -33,14 +33,15 @@ static void step(Path *path, const Scene *scene, Rng *rng)
     const real sigma_n = path->majorant - sigma;
 #if PROBABILITY == PROBABILITY_NO_ABSORPTION
     const real ends = scene->tracker.albedo * sigma;
-    deposit(path, path->weight * (sigma - ends) * path->mean_free_path, path->t, (mask)0, here);
+    deposit(path, path->weight * (sigma - ends) / path->majorant, path->t, (mask)0, here);
 #else
     const real ends = sigma;
 #endif
     const real both = ends + fabs(sigma_n);
     const mask collided = here & less(uniform(rng) * both, ends);
     const real sign = choose(collided | less((real)0, sigma_n), (real)1, (real)-1);
-    path->weight = choose(here, path->weight * sign * both * path->mean_free_path, path->weight);
+    const real share = sign * both / path->majorant;
+    path->weight = choose(here, path->weight * share, path->weight);
 #endif
     collide(path, collided);
 }
