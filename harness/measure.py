@@ -21,7 +21,7 @@ COUNTING_S = 0.05
 ENOUGH_S = 0.01
 """Device time from which on a run tells what a sample costs."""
 MOST_SAMPLES = 1 << 30
-"""A run of so many samples ends calibration, whatever time a driver says that it took."""
+"""No round holds more, and calibration ends there, whatever time a driver says that it takes."""
 LEAST_ROUNDS = 10
 """Rounds that a budget, or a number of samples, is divided into at least."""
 UNITS_PER_LANE = 32
@@ -136,7 +136,7 @@ class Bench:
     def _calibrated(self) -> Shape:
         rays, one = self.timed.rays, self._run_for(self.timed, ENOUGH_S)
         seconds = min(ROUND_S, self.rule.at_most_s / LEAST_ROUNDS)
-        wanted = int(seconds / (one.time_per_sample_s * rays))
+        wanted = min(int(seconds / one.time_per_sample_s), MOST_SAMPLES) // rays
         if self.rule.samples is not None:
             wanted = min(wanted, self.rule.samples // LEAST_ROUNDS)
         return shape_of(wanted, rays, one.time_per_sample_s, self.timed.lanes_in_all)

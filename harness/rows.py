@@ -139,7 +139,7 @@ def verdict(
         remarks.append(f"{row['truncated']} paths were cut off at the step cap")
     if row["violations"]:
         share = row["violations"] / (row["lookups_per_sample"] * row["counted_samples"])
-        remarks.append(f"{100 * share:.2g} % of the lookups were above the majorant")
+        remarks.append(f"{100 * share:.3g} % of the lookups were above the majorant")
     claims = tracker.unbiased and not remarks
     if claims and result.contradicted(largest_score, ROUNDING[row["arithmetic"]]):
         return "mismatch", _difference(result)

@@ -43,3 +43,32 @@ def load_text(tmp_path, monkeypatch, small_catalog):
         return config.load("x.yaml", small_catalog.parameter_models(), overrides)
 
     return load
+
+
+@pytest.fixture(scope="session")
+def device():
+    """The PoCL that comes with pip where it is installed, else the first device."""
+    from freepath.device import open_devices
+    from freepath.errors import DeviceError
+
+    try:
+        return open_devices(["3.0"])[0]
+    except DeviceError:
+        return open_devices([])[0]
+
+
+@pytest.fixture
+def selector(device):
+    """What -d takes for that device."""
+    info = device.info
+    return f"{info.platform} / {info.name} / {info.driver_version}"
+
+
+@pytest.fixture
+def work(tmp_path, monkeypatch):
+    """An empty working directory, with a cache of its own."""
+    monkeypatch.setenv("FREEPATH_CACHE", str(tmp_path / "cache"))
+    folder = tmp_path / "work"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    return folder

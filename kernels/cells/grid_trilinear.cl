@@ -12,9 +12,12 @@ static void cells_begin(Path *path, const Scene *scene)
 {
     index cell;
     State *walk = &path->state;
-    dda_axis(path->origin_x + (SCALAR)0.5, path->direction_x, scene->medium.nx + 1, &cell, &walk->first_x, &walk->delta_x);
-    dda_axis(path->origin_y + (SCALAR)0.5, path->direction_y, scene->medium.ny + 1, &cell, &walk->first_y, &walk->delta_y);
-    dda_axis(path->origin_z + (SCALAR)0.5, path->direction_z, scene->medium.nz + 1, &cell, &walk->first_z, &walk->delta_z);
+    dda_axis(path->origin_x + (SCALAR)0.5, path->direction_x, path->length, scene->medium.nx + 1, &cell,
+             &walk->first_x, &walk->delta_x);
+    dda_axis(path->origin_y + (SCALAR)0.5, path->direction_y, path->length, scene->medium.ny + 1, &cell,
+             &walk->first_y, &walk->delta_y);
+    dda_axis(path->origin_z + (SCALAR)0.5, path->direction_z, path->length, scene->medium.nz + 1, &cell,
+             &walk->first_z, &walk->delta_z);
     dda_begin(path);
 }
 

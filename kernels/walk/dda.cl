@@ -12,16 +12,18 @@ state:
   crossed_z: real
 ---*/
 /* The n-th plane of an axis is met at first + n delta: one rounding however many were crossed, where a
-   running sum would drift. A ray along a plane never meets that axis (FAR). Where planes are met at the
-   same t (edges, corners) all of their axes step at once, so no cell of zero length is visited. */
-static void dda_axis(const real where, const real velocity, const SCALAR cells, index *cell, real *first,
-                     real *delta)
+   running sum would drift. A ray along a plane never meets that axis (FAR), nor does one that rounding
+   keeps where it is over all of its length: lookups stay in the cell that it starts in. Where planes are
+   met at the same t (edges, corners) all of their axes step at once, so no cell of zero length is
+   visited. */
+static void dda_axis(const real where, const real velocity, const real length, const SCALAR cells,
+                     index *cell, real *first, real *delta)
 {
     *cell = clamp(to_index(where), (index)0, (index)((INTEGER)cells - 1));
     const mask forward = less((real)0, velocity);
     const real speed = choose(forward, velocity, -velocity);
     const real gap = choose(forward, to_real(*cell) + (SCALAR)1 - where, where - to_real(*cell));
-    const mask flat = equal(velocity, (real)0);
+    const mask flat = equal(where + velocity * length, where);
     const real pace = smaller((SCALAR)1 / choose(flat, (real)1, speed), (real)FAR);
     *first = choose(flat, (real)FAR, gap * pace);
     *delta = choose(flat, (real)0, pace);

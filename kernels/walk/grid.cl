@@ -26,11 +26,11 @@ static void cells_enter(Path *path, const Scene *scene)
     const INTEGER slice = row * ((INTEGER)scene->majorant.ny + 2);
     index i, j, k;
     dda_axis(path->origin_x * scene->majorant.cells_per_x, path->direction_x * scene->majorant.cells_per_x,
-             scene->majorant.nx, &i, &walk->first_x, &walk->delta_x);
+             path->length, scene->majorant.nx, &i, &walk->first_x, &walk->delta_x);
     dda_axis(path->origin_y * scene->majorant.cells_per_y, path->direction_y * scene->majorant.cells_per_y,
-             scene->majorant.ny, &j, &walk->first_y, &walk->delta_y);
+             path->length, scene->majorant.ny, &j, &walk->first_y, &walk->delta_y);
     dda_axis(path->origin_z * scene->majorant.cells_per_z, path->direction_z * scene->majorant.cells_per_z,
-             scene->majorant.nz, &k, &walk->first_z, &walk->delta_z);
+             path->length, scene->majorant.nz, &k, &walk->first_z, &walk->delta_z);
     walk->cell = (k + 1) * slice + (j + 1) * row + (i + 1);
     walk->stride_x = choose(less(path->direction_x, (real)0), (index)-1, (index)1);
     walk->stride_y = choose(less(path->direction_y, (real)0), (index)-row, (index)row);

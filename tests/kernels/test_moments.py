@@ -1,0 +1,77 @@
+"""Variance and cost of delta and ratio tracking agree with their closed forms."""
+
+import itertools
+
+import numpy as np
+import pytest
+from support.identities import check_count, check_variance, sidak
+from support.media import MAJORANTS, MEDIA
+from support.truth import MajorantAlongRays
+
+SAMPLES = 4096
+# Beyond this optical depth the weights of ratio tracking have so heavy a tail that the variance of
+# a sample says little about the variance.
+THICKEST = 2.0
+
+CASES = list(itertools.product(("delta", "ratio"), MEDIA, MAJORANTS))
+# two checks of each case
+ALPHA = sidak(1e-3, 2 * len(CASES))
+
+
+@pytest.mark.parametrize(("tracker", "medium", "majorant"), CASES)
+def test_variance_and_lookups(rig, tracker, medium, majorant):
+    # the lanes with which test_identities builds this kernel at the latest
+    turn = list(MEDIA).index(medium) + list(MAJORANTS).index(majorant)
+    flight = rig.flight(
+        tracker=tracker, medium=medium, majorant=majorant, tightness=1.5, lanes=(16, 1)[turn % 2]
+    )
+    expected = EXPECTED[tracker](flight)
+    depth = flight.medium.optical_depth(flight.segments)
+    thin = depth <= THICKEST
+    assert np.count_nonzero(thin) > 100
+    samples = flight.record(SAMPLES)
+    scores = samples.scores("transmittance")
+    check_variance(scores[thin], expected["variance"][thin], ALPHA)
+    check_count(samples.lookups, expected["lookups"], ALPHA)
+    assert samples.lookups.sum() == samples.round.counters["lookups"]
+
+
+def delta(flight):
+    transmittance = flight.reference()
+    return {
+        "variance": transmittance * (1.0 - transmittance),
+        "lookups": along(flight).collisions_until_real(),
+    }
+
+
+def ratio(flight):
+    depth = flight.medium.optical_depth(flight.segments)
+    majorant = along(flight)
+    return {
+        "variance": np.exp(-2.0 * depth) * np.expm1(majorant.square_over_majorant()),
+        "lookups": majorant.tentative_collisions(),
+    }
+
+
+EXPECTED = {"delta": delta, "ratio": ratio}
+
+
+def along(flight):
+    case = flight.case
+    return MajorantAlongRays(case.majorant, flight.medium, case.tightness, flight.segments)
+
+
+def test_regular_and_march_look_up_once_a_piece(rig):
+    """The cost of a walk through the medium, and that of a walk in equal steps."""
+    regular = rig.flight(tracker="regular", medium="trilinear", lanes=1)
+    pieces = regular.medium.pieces(regular.segments).length
+    # rounding may make or miss a piece of all but no length, where a ray meets an edge
+    least, most = (np.count_nonzero(pieces > limit, axis=1) for limit in (1e-5, 0.0))
+    lookups = regular.record(2).lookups
+    assert (lookups == lookups[:, :1]).all()
+    assert ((least <= lookups[:, 0]) & (lookups[:, 0] <= most + 1)).all()
+
+    march = rig.flight(
+        tracker={"march": {"step": 0.125}}, medium="trilinear", lanes=1, majorant="global"
+    )
+    assert (march.record(2).lookups[:, 0] == np.ceil(march.segments[:, 6] / 0.125)).all()

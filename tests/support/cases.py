@@ -1,0 +1,106 @@
+"""Which cases a tracker is tested on, by what its front matter says, and the test of one."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from freepath.catalog import Tracker
+from freepath.config.models import MEDIA as MODELS
+from freepath.stats import Moments
+
+from support.identities import (
+    check_clean,
+    check_empty,
+    check_exact,
+    check_free_path,
+    check_mean,
+)
+from support.media import MAJORANTS, MEDIA
+from support.rig import Flight, Rig, Samples
+from support.truth import depth_at
+
+Axes = dict[str, Any]
+
+DISTRIBUTED = 128  # samples of each ray of which the depth is looked up: that is dear in a grid
+VARIES = 100.0  # roundings that a sample may be off
+COARSE = 0.05  # what a tracker that says it is biased may be off with its default parameters
+
+
+def cases_of(tracker: Tracker) -> list[Axes]:
+    """Every estimand x medium that the tracker allows.
+
+    Majorants, lanes and tightness go round, so that each value meets each medium and estimand of
+    some tracker without a kernel to compile for every combination.
+    """
+    walks = MAJORANTS | {"octree": {"octree": {"resolution": 8}}}
+    majorants = ["global"]
+    if "majorant" in tracker.needs:
+        majorants = [name for name in walks if name in tracker.majorants]
+    tightness = [1, 2] if tracker.bounding else [1, 2, 0.8]
+    cases = []
+    for e, estimand in enumerate(tracker.estimands):
+        for m, medium in enumerate(MEDIA):
+            (kind,) = MEDIA[medium]
+            if tracker.needs - {"majorant", "control"} - MODELS[kind].OFFERS:
+                continue
+            turn = e + m
+            majorant = majorants[turn % len(majorants)]
+            axes = {"tracker": tracker.name, "estimand": estimand, "medium": medium}
+            axes |= {"majorant": walks.get(majorant) if majorant == "octree" else majorant}
+            axes |= {"tightness": tightness[turn % len(tightness)], "lanes": (16, 1)[turn % 2]}
+            cases.append(axes)
+    return cases
+
+
+def name_of(axes: Axes) -> str:
+    """The name of a case as a test's."""
+    majorant = axes["majorant"] if isinstance(axes["majorant"], str) else "octree"
+    parts = [axes["tracker"], axes["estimand"], axes["medium"], majorant]
+    return "-".join([*parts, f"t{axes['tightness']}", f"l{axes['lanes']}"])
+
+
+def check_case(rig: Rig, axes: Axes, alpha: float, samples: int = 2048, **options: Any) -> None:
+    """Build a case, take samples, and hold them against the exact values."""
+    flight = rig.flight(**axes, **options)
+    check_samples(flight, flight.record(samples), alpha)
+
+
+def check_samples(flight: Flight, samples: Samples, alpha: float) -> None:
+    """All that must hold for samples of any tracker."""
+    tracker, case = flight.tracker, flight.case
+    check_clean(samples.round, bounded=case.majorant is not None and case.tightness >= 1)
+    expected, moments = flight.reference(), samples.round.moments
+    depth = flight.medium.optical_depth(flight.segments)
+    if case.estimand == "transmittance":
+        still = moments.m2 == 0.0  # next-flight and the like vary in empty space too
+        check_empty(Moments(moments.count, moments.mean[still], moments.m2[still]), depth[still], flight.rounding)
+    if not tracker.unbiased:
+        bias = float(np.sqrt(np.mean((moments.mean - expected) ** 2)))
+        assert bias < COARSE, f"bias {bias}"
+    elif 0.0 < samples.round.variance < (VARIES * flight.rounding) ** 2:
+        # an estimator whose variance vanishes here, and whose samples differ by rounding alone
+        np.testing.assert_allclose(moments.mean, expected, rtol=VARIES * flight.rounding)
+    elif samples.round.variance == 0.0:
+        pieces = np.count_nonzero(flight.medium.pieces(flight.segments).length, axis=1)
+        check_exact(moments, expected, flight.rounding, _largest_depth(flight), pieces)
+    else:
+        check_mean(moments, expected, alpha / 2)
+        if case.estimand == "free_path" and (samples.weight == 1.0).all():
+            check_distribution(flight, samples, alpha / 2, DISTRIBUTED)
+
+
+def _largest_depth(flight: Flight) -> np.ndarray:
+    """A bound of the optical depth of each ray that takes no rounding into account."""
+    upper = flight.medium.bounds((1, 1, 1))[1].max()
+    speed = np.linalg.norm(flight.segments[:, 3:6], axis=1)
+    return upper * np.sqrt((flight.medium.extent**2).sum()) / speed
+
+
+def check_distribution(
+    flight: Flight, samples: Samples, alpha: float, at_most: int | None = None
+) -> None:
+    """Free paths have the distribution that the medium gives them; `at_most` samples a ray."""
+    depth = flight.medium.optical_depth(flight.segments)
+    at = depth_at(flight.medium, flight.segments, samples.t[:, :at_most])
+    check_free_path(at, samples.escaped[:, :at_most], depth, alpha)

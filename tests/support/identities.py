@@ -1,0 +1,163 @@
+"""What must hold for samples of any tracker, as checks that a wrong kernel fails.
+
+Each takes `alpha`, the chance with which it may reject a right kernel, and shares it out over the
+tests that it makes itself. None looks at how the kernel works, so that a tracker from elsewhere is
+checked as the project's own are.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from freepath.runner import Round
+from freepath.stats import Moments
+from numpy.typing import NDArray
+from scipy import stats
+
+Array = NDArray[np.float64]
+
+GROUPS = 8  # of rays with like expectations: errors of thin and of thick rays must not cancel
+
+
+def sidak(alpha: float, tests: int) -> float:
+    """The level of each of several tests such that all together reject wrongly with `alpha`."""
+    return float(-np.expm1(np.log1p(-alpha) / tests))
+
+
+def require(p_values: Array, alpha: float, what: str) -> None:
+    """Fail where the smallest of several p-values is smaller than chance explains."""
+    p_values = np.atleast_1d(p_values)
+    level, worst = sidak(alpha, len(p_values)), int(np.argmin(p_values))
+    if not p_values[worst] >= level:  # also where it is no number
+        text = f"{what}: p = {p_values[worst]:.2g} in part {worst} of {len(p_values)}"
+        raise AssertionError(f"{text}, expected at least {level:.2g}")
+
+
+def _p_of_groups(deviation: Array, square_error: Array, order_by: Array) -> Array:
+    """Two-sided p-values of sums over groups of rays with independent errors.
+
+    Each group has the same share of all noise: a group of rays on which hardly anything happens
+    would have no normal distribution, nor a sample of its variance.
+    """
+    order = np.argsort(order_by, kind="stable")
+    share = np.cumsum(square_error[order])
+    if share[-1] == 0.0:
+        return np.array([float(not deviation.any())])
+    group = np.minimum((GROUPS * share / share[-1]).astype(int), GROUPS - 1)
+    difference = np.bincount(group, deviation[order], GROUPS)
+    error = np.sqrt(np.bincount(group, square_error[order], GROUPS))
+    there = error > 0.0
+    return 2.0 * stats.norm.sf(np.abs(difference[there]) / error[there])
+
+
+def check_clean(one: Round, *, bounded: bool) -> None:
+    """Nothing capped, nothing infinite, and no violation of a majorant that bounds."""
+    watched = ("truncated", "nonfinite", "violations") if bounded else ("truncated", "nonfinite")
+    found = {name: one.counters[name] for name in watched}
+    assert not any(found.values()), found
+
+
+def check_mean(moments: Moments, expected: Array, alpha: float) -> None:
+    """z-tests of the mean of each group of rays."""
+    deviation, square_error = moments.mean - expected, moments.variance / moments.count
+    require(_p_of_groups(deviation, square_error, expected), alpha, "mean")
+
+
+def check_count(counts: Array, expected: Array, alpha: float) -> None:
+    """z-tests of the mean of whole numbers (rays, samples), such as lookups."""
+    square_error = counts.var(axis=1, ddof=1) / counts.shape[1]
+    p_values = _p_of_groups(counts.mean(axis=1) - expected, square_error, expected)
+    require(p_values, alpha, "count")
+
+
+def check_variance(scores: Array, expected: Array, alpha: float) -> None:
+    """z-tests of the variance of scores (rays, samples).
+
+    The variance of a sample variance is (m4 - s^4 (n - 3) / (n - 1)) / n; the fourth central
+    moment m4 comes from the samples, which must therefore not have too heavy a tail.
+    """
+    count = scores.shape[1]
+    deviation = scores - scores.mean(axis=1, keepdims=True)
+    square = (deviation**2).sum(axis=1) / (count - 1)
+    fourth = (deviation**4).mean(axis=1)
+    error = np.maximum(fourth - square**2 * (count - 3) / (count - 1), 0.0) / count
+    require(_p_of_groups(square - expected, error, expected), alpha, "variance")
+
+
+def check_empty(moments: Moments, depth: Array, rounding: float) -> None:
+    """Nothing is lost along a ray through nothing, but for a rounding or two."""
+    empty = depth == 0.0
+    lost = np.abs(1.0 - moments.mean[empty])
+    assert not (lost > 4.0 * rounding).any(), f"empty space takes {lost.max():.2g}"
+
+
+def check_exact(
+    moments: Moments, expected: Array, rounding: float, depth: Array, pieces: Array
+) -> None:
+    """An estimator without variance returns the transmittance up to rounding.
+
+    `depth` bounds the optical depth of each ray from above by majorant x length, `pieces` counts
+    the parts that it is summed over. Each part adds at most eight roundings to the depth: three to
+    where it starts and as many to where it ends, one of its product and one of the sum. A closed
+    form adds at most 64: 16 of erf (OpenCL 7.4), 8 of sin, cos and exp, and up to 32 of arguments
+    of size 16. They add up in the worst case, and as a random walk on average over the rays.
+    """
+    assert not moments.m2.any(), "an estimator that claims to be exact varies"
+    roundings = 8.0 * pieces + 64.0
+    scale = rounding * np.maximum(depth, 1.0)
+    error = np.abs(moments.mean - expected) / np.maximum(expected, 1e-30)  # far below: underflow
+    worst = np.max(error / (roundings * scale))
+    assert worst <= 1.0, f"error {worst:.3g} times the bound of rounding"
+    average = np.sqrt(np.mean((error / scale) ** 2 / roundings))
+    assert average <= 1.0, f"error {average:.3g} times that of random rounding"
+
+
+def check_free_path(
+    depth_at: Array, escaped: NDArray[np.bool_], depth: Array, alpha: float, bins: int = 64
+) -> None:
+    """Chi-square and Kolmogorov-Smirnov tests of free paths against F = 1 - exp(-tau(t)).
+
+    `depth_at` is the exact optical depth tau(t) at the end of each sample (rays, samples), `depth`
+    that of the whole ray. Of the paths that do not escape, F / F(length) is uniform whatever the
+    ray; how many escape is a test of its own. Both together are the chi-square test with an escape
+    bin, exact also for rays of different depth. Uniforms are multiples of 2^-24, far below what
+    the tests resolve.
+    """
+    collided = ~escaped
+    empty = depth == 0.0
+    assert not collided[empty].any(), "a collision in nothing"
+    share = np.expm1(-depth_at) / np.where(empty, -1.0, np.expm1(-depth))[:, None]
+    values = share[collided]
+    observed = np.histogram(np.clip(values, 0.0, 1.0), bins, (0.0, 1.0))[0]
+    expected = values.size / bins
+    escape = np.exp(-depth)
+    excess = escaped.sum() - escaped.shape[1] * escape.sum()
+    spread = escaped.shape[1] * (escape * (1.0 - escape)).sum()
+    square = ((observed - expected) ** 2 / expected).sum()
+    square += excess**2 / spread if spread > 0.0 else 0.0 if excess == 0.0 else np.inf
+    p_values = [stats.chi2.sf(square, bins), stats.kstest(values, "uniform").pvalue]
+    require(np.array(p_values), alpha, "free path (chi-square, KS)")
+
+
+def check_same_samples(one: Array, other: Array, lookups: tuple[Array, Array], rounding: float):
+    """The same paths: equal lookups but for fewer than 1 in 1e5, and equal scores up to rounding.
+
+    The last bit of a logarithm may decide about a collision, which is then another path. Elsewhere
+    a product of up to a hundred factors, each with a few roundings, is left to differ.
+    """
+    other_path = lookups[0] != lookups[1]
+    differing = np.count_nonzero(other_path)
+    assert differing < 1e-5 * other_path.size, f"{differing} of {other_path.size} paths differ"
+    scale = np.maximum(np.abs(one), np.abs(other))
+    distance = np.abs(one - other)[~other_path]
+    bad = distance > 1000.0 * rounding * np.maximum(scale[~other_path], rounding)
+    assert np.count_nonzero(bad) < 1e-5 * other_path.size, f"{np.count_nonzero(bad)} scores differ"
+    error = abs(one.mean() - other.mean())
+    flips = (differing + np.count_nonzero(bad)) / other_path.size
+    assert error <= 1000.0 * rounding * scale.mean() + flips * scale.max(), f"means differ by {error}"
+
+
+def check_order(steps: Array, bias: Array, order: float, tolerance: float) -> None:
+    """The bias falls as steps^order: the slope of its logarithm, by least squares."""
+    slope = float(np.polyfit(np.log(steps), np.log(np.abs(bias)), 1)[0])
+    text = f"converges at order {slope:.3f}, expected {order} +- {tolerance}"
+    assert abs(slope - order) <= tolerance, text

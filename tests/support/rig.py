@@ -1,0 +1,168 @@
+"""Flies rays through media as a run does: the same config, plan, source, device and runner."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from freepath import config, plan, source, sweep
+from freepath.catalog import Catalog, Tracker
+from freepath.device import Device, Program, scalar_type
+from freepath.plan import Case
+from freepath.runner import KernelData, Round, Runner
+from freepath.scene import Medium, build_medium, reference
+from freepath.scene import segments as inside
+from freepath.source import Source
+from freepath.sweep import Scene
+
+from support.media import CHORDS, MAJORANTS, MEDIA
+
+SEED = 20240229
+
+
+@dataclass(frozen=True)
+class Change:
+    """A defect to plant: a piece of the composed source, and what to put in its place."""
+
+    old: str
+    new: str
+
+    def apply(self, text: str) -> str:
+        """Replace the one place; a test whose defect has no place any more must not pass."""
+        assert text.count(self.old) == 1, f"{text.count(self.old)} places for {self.old!r}"
+        return text.replace(self.old, self.new)
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Single samples, each array of the shape (rays, samples), and the round they came from."""
+
+    t: np.ndarray
+    weight: np.ndarray
+    escaped: np.ndarray
+    lookups: np.ndarray
+    score: np.ndarray
+    round: Round
+
+    def scores(self, estimand: str) -> np.ndarray:
+        """What each sample contributes to the mean."""
+        if estimand == "transmittance":
+            return np.where(self.escaped, self.weight, 0.0)
+        return self.weight * self.t if estimand == "free_path" else self.weight
+
+
+@dataclass(frozen=True)
+class Flight:
+    """A case that is built and ready to run."""
+
+    case: Case
+    tracker: Tracker
+    medium: Medium
+    segments: np.ndarray
+    """As the kernel reads them: in its precision, so that rounding of input is no error of it."""
+    runner: Runner
+    recording: bool
+    """Whether the kernel writes every sample: then every run must give it the room."""
+
+    @property
+    def rounding(self) -> float:
+        """The unit roundoff of the kernel's arithmetic."""
+        return float(np.finfo(scalar_type(self.case.arithmetic)).eps) / 2
+
+    def reference(self) -> np.ndarray:
+        """The exact value of each ray."""
+        return reference(self.case.estimand, self.medium, self.segments)
+
+    def run(self, samples: int, blocks: int = 1, **options: Any) -> Round:
+        """Take samples of every ray, from number 0 on unless `first_sample` says otherwise."""
+        first = options.pop("first_sample", 0)
+        return self.runner.run(first, samples, blocks, record=self.recording, **options)
+
+    def record(self, samples: int, blocks: int = 1, **options: Any) -> Samples:
+        """Take samples and keep each."""
+        one = self.run(samples, blocks, **options)
+        recorded = one.recorded.reshape(blocks, -1, samples, 5).astype(np.float64)
+        t, weight, escaped, counted, score = np.moveaxis(recorded, -1, 0)
+        # lookups are a running count of each unit
+        lookups = np.diff(counted, axis=2, prepend=0.0)
+        t, weight, escaped, lookups, score = (
+            np.swapaxes(array, 0, 1).reshape(-1, blocks * samples)
+            for array in (t, weight, escaped, lookups, score)
+        )
+        return Samples(t, weight, escaped > 0, lookups, score, one)
+
+
+class Rig:
+    """Makes flights on one device; what is built once is not built again in a session."""
+
+    def __init__(self, device: Device, catalog: Catalog, folder: Path):
+        self.device = device
+        self.catalog = catalog
+        self.folder = folder
+        self._programs: dict[str, Program] = {}
+        self._media: dict[str, Medium] = {}
+
+    def with_trackers(self, catalog: Catalog) -> Rig:
+        """The same rig for another catalog; it shares what is built."""
+        rig = Rig(self.device, catalog, self.folder)
+        rig._programs, rig._media = self._programs, self._media
+        return rig
+
+    def volume(self, voxels: np.ndarray, **keys: Any) -> dict[str, Any]:
+        """A medium of a config from voxels [z, y, x], by way of a file as a user would give them."""
+        path = self.folder / f"{source.combined_hash(np.ascontiguousarray(voxels).tobytes())}.npy"
+        np.save(path, voxels.astype(np.float32))
+        return {"volume": {"file": str(path), **keys}}
+
+    def case(self, *, rays: dict = CHORDS, seed: int = SEED, **axes: Any) -> Case:
+        """The one case of a config; media and majorants may be given by their names here."""
+        axes["medium"] = _named(MEDIA, axes["medium"])
+        axes["majorant"] = _named(MAJORANTS, axes.get("majorant", "global"))
+        # JSON is YAML
+        text = json.dumps({"name": "test", "seed": seed, "rays": rays, "matrix": axes})
+        path = self.folder / "case.yaml"
+        path.write_text(text)
+        loaded = config.load(path, self.catalog.parameter_models())
+        (case,) = plan.expand(loaded, self.catalog)
+        assert not case.skip_reason, case.skip_reason
+        return case
+
+    def flight(
+        self,
+        *,
+        lines: tuple[np.ndarray, np.ndarray] | None = None,
+        count: bool = True,
+        record: bool = True,
+        change: Change | None = None,
+        **axes: Any,
+    ) -> Flight:
+        """Build a case. `lines` are origins and directions of its rays, instead of random chords."""
+        case = self.case(**axes)
+        key = str(case.medium.as_dict())
+        if key not in self._media:
+            self._media[key] = build_medium(case.medium)
+        medium = self._media[key]
+        scene = Scene(medium, inside(*lines, medium)) if lines else Scene.of(case, medium, [])
+        structure = sweep.structure_of(
+            case, self.catalog, medium, self.device, count=count, record=record
+        )
+        text = source.compose(structure)
+        if change:
+            text = Source(change.apply(text.text), text.options)
+        data = KernelData.upload(self.device, scene.segments, medium.data, case.arithmetic)
+        runner = sweep.runner_of(case, structure, scene, self.program(text), data)
+        read = scene.segments.astype(scalar_type(case.arithmetic)).astype(np.float64)
+        return Flight(case, self.catalog.trackers[case.tracker], medium, read, runner, record)
+
+    def program(self, text: Source) -> Program:
+        """Build a source, each only once."""
+        if text.sha256 not in self._programs:
+            self._programs[text.sha256] = self.device.build(text)
+        return self._programs[text.sha256]
+
+
+def _named(known: dict[str, Any], name: Any) -> Any:
+    return known.get(name, name) if isinstance(name, str) else name

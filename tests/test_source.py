@@ -1,0 +1,187 @@
+import re
+
+import pytest
+from freepath import kernel_files, source
+from freepath.errors import CatalogError
+from freepath.kernel_files import split_front_matter
+from freepath.source import Source, Structure, combined_hash, compose, numbers_of
+
+DELTA = {
+    "tracker": "mine",
+    "tracker_code": "\n\n\n/* line 4 */\nstatic void step(void) {}\n",
+    "needs": frozenset({"majorant"}),
+    "tracker_numbers": (),
+    "choices": (),
+    "estimand": "transmittance",
+    "medium": "homogeneous",
+    "medium_numbers": ("sigma_t",),
+    "majorant": "global",
+    "majorant_numbers": ("sigma_t",),
+    "lanes": 16,
+    "arithmetic": "strict",
+}
+GRID = ("nx", "ny", "nz", "cells_per_x", "cells_per_y", "cells_per_z")
+
+
+def composed(**changes):
+    return compose(Structure(**DELTA | changes)).text
+
+
+def files_of(text):
+    """The files that a source names, in their order."""
+    return list(dict.fromkeys(re.findall(r'#line \d+ "(.+\.cl)"', text)))
+
+
+def test_a_source_has_what_the_case_needs_and_nothing_else():
+    assert files_of(composed()) == [
+        "lanes/vector.cl",
+        "lanes/common.cl",
+        "math/log_polynomial.cl",
+        "lanes/rng.cl",
+        "estimands/transmittance.cl",
+        "count/off.cl",
+        "medium/homogeneous.cl",
+        "lanes/path.cl",
+        "majorant/global.cl",
+        "trackers/mine.cl",
+        "lanes/tally.cl",
+        "record/nothing.cl",
+        "main.cl",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("changes", "added", "dropped"),
+    [
+        ({"lanes": 1}, {"lanes/scalar.cl"}, {"lanes/vector.cl"}),
+        ({"count": True}, {"count/on.cl"}, {"count/off.cl"}),
+        ({"record": True}, {"record/samples.cl"}, {"record/nothing.cl"}),
+        ({"logarithm": "builtin"}, {"math/log_builtin.cl"}, {"math/log_polynomial.cl"}),
+        ({"arithmetic": "double"}, {"math/log_builtin.cl"}, {"math/log_polynomial.cl"}),
+        ({"estimand": "free_path"}, {"estimands/free_path.cl"}, {"estimands/transmittance.cl"}),
+        ({"needs": frozenset()}, set(), {"majorant/global.cl"}),
+        (
+            {"majorant": "grid", "majorant_numbers": GRID},
+            {"majorant/grid.cl", "walk/dda.cl"},
+            {"majorant/global.cl"},
+        ),
+        ({"needs": frozenset({"closed_form"})}, {"closed_form/homogeneous.cl"}, {"majorant/global.cl"}),
+        ({"needs": frozenset({"cells"})}, {"cells/homogeneous.cl"}, {"majorant/global.cl"}),
+    ],
+)
+def test_a_choice_exchanges_files(changes, added, dropped):
+    before, after = set(files_of(composed())), set(files_of(composed(**changes)))
+    assert after - before >= added
+    assert before - after == dropped
+
+
+def test_a_file_that_two_others_use_is_there_once_and_before_them():
+    both = composed(
+        needs=frozenset({"majorant", "cells"}),
+        majorant="grid",
+        majorant_numbers=GRID,
+        medium="grid_trilinear",
+        medium_numbers=("nx", "ny", "nz"),
+    )
+    assert both.count('#line 1 "walk/dda.cl"') == 1
+    order = files_of(both)
+    assert order.index("walk/dda.cl") < order.index("majorant/grid.cl")
+    assert order.index("walk/dda.cl") < order.index("cells/grid_trilinear.cl")
+
+
+def test_lines_are_numbered_as_in_their_files():
+    text = composed(needs=frozenset({"cells"}), medium="layered", medium_numbers=("layers",))
+    name, line = "", 0
+    seen = {}
+    for content in text.splitlines():
+        directive = re.fullmatch(r'#line (\d+)(?: "(.+)")?', content)
+        if directive:
+            line, name = int(directive[1]), directive[2] or name
+        else:
+            seen[name, line] = content
+            line += 1
+    assert seen["trackers/mine.cl", 4] == "/* line 4 */"
+    for (file, number), content in seen.items():
+        if file.endswith(".cl") and not file.startswith("trackers/"):
+            code = kernel_files.read(file.removesuffix(".cl")).code.split("\n")
+            assert code[number - 1] == content, (file, number)
+
+
+def test_numbers_are_declared_in_the_order_in_which_they_are_given():
+    structure = Structure(**DELTA | {"tracker_numbers": ("step",), "medium_numbers": ("a", "b")})
+    declared = re.findall(r"typedef struct \{ SCALAR (.+); \} (\w+)Numbers;", compose(structure).text)
+    assert [group for _, group in declared] == ["Box", "Medium", "Majorant", "Tracker"]
+    names = [name for names, _ in declared for name in names.split(", ")]
+    assert names == ["extent_x", "extent_y", "extent_z", "a", "b", "sigma_t", "step"]
+    values = numbers_of(
+        structure, [1.0, 2.0, 3.0], {"b": 5.0, "a": 4.0}, {"sigma_t": 6.0}, {"step": 7.0}
+    )
+    assert values == [1, 2, 3, 4, 5, 6, 7]
+
+
+def test_a_tracker_without_a_majorant_is_given_no_numbers_of_one():
+    structure = Structure(**DELTA | {"needs": frozenset()})
+    assert "MajorantNumbers" not in compose(structure).text
+    assert numbers_of(structure, [1.0, 1.0, 1.0], {"sigma_t": 2.0}, {}, {}) == [1, 1, 1, 2]
+
+
+def test_choices_become_defines():
+    text = composed(choices=(("placement", "end", ("start", "end")), ("order", "2", ("1", "2"))))
+    for line in (
+        "#define PLACEMENT_START 0",
+        "#define PLACEMENT_END 1",
+        "#define PLACEMENT PLACEMENT_END",
+        "#define ORDER ORDER_2",
+    ):
+        assert line in text.splitlines()
+
+
+def test_the_state_of_a_path_is_that_of_its_walk_and_its_tracker():
+    text = composed(
+        majorant="grid", majorant_numbers=GRID, tracker_state=(("best", "real"), ("hit", "mask"))
+    )
+    for declared in ("index cell;", "real best;", "mask hit;"):
+        assert f"    {declared}\n" in text
+    assert "into->best = choose(where, from->best, into->best);" in text
+    assert "index unused;" in composed()
+
+
+def test_a_tracker_may_not_take_the_state_of_its_walk():
+    with pytest.raises(CatalogError, match=r"trackers/mine\.cl: .*'cell'"):
+        composed(majorant="grid", majorant_numbers=GRID, tracker_state=(("cell", "index"),))
+
+
+def test_the_hash_tells_sources_and_options_apart():
+    strict = compose(Structure(**DELTA))
+    fast = compose(Structure(**DELTA | {"arithmetic": "fast"}))
+    assert strict.text == fast.text
+    assert len({strict.sha256, fast.sha256, strict.unoptimised().sha256}) == 3
+    assert compose(Structure(**DELTA)).sha256 == strict.sha256
+    assert strict.unoptimised().options == (*strict.options, "-cl-opt-disable")
+    assert strict.unoptimised().text == strict.text
+
+
+def test_relaxed_arithmetic_is_only_where_it_is_asked_for():
+    for arithmetic, options in source.BUILD_OPTIONS.items():
+        assert ("-cl-fast-relaxed-math" in options) == (arithmetic == "fast")
+    assert "cl_khr_fp64" in composed(arithmetic="double")
+    assert "cl_khr_fp64" not in composed(arithmetic="fast")
+
+
+def test_a_hash_of_parts_knows_where_they_end():
+    assert combined_hash("ab", "c") != combined_hash("a", "bc")
+    assert combined_hash("a") == combined_hash(b"a")
+    assert Source("a", ("b",)).sha256 == combined_hash("a", "b")
+
+
+def test_front_matter_and_code_keep_their_lines():
+    text = "\n/*---\ntitle: x\n---*/\n/* code */\n"
+    front, code = split_front_matter(text)
+    assert front.split("\n")[2] == "title: x"
+    assert code.split("\n")[4] == "/* code */"
+    assert code.strip() == "/* code */"
+
+
+def test_a_file_without_front_matter_is_all_code():
+    assert split_front_matter("int x; /*--- no ---*/\n") == (None, "int x; /*--- no ---*/\n")
+    assert split_front_matter("") == (None, "")
