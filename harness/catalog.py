@@ -86,6 +86,20 @@ def _rule(keys: dict[str, Any]) -> Rule:
     return Choice(keys["choices"])
 
 
+class Bounding(Flag):
+    """Whether the majorant must bound: true, false, or the choices of a parameter that need it."""
+
+    def check(self, value: Any, context: Any) -> bool | dict[str, tuple[Any, ...]]:
+        """Return the truth value, or the choices by parameter."""
+        if isinstance(value, dict) and all(isinstance(given, list) for given in value.values()):
+            return {name: tuple(given) for name, given in value.items()}
+        return super().check(value, context)
+
+    def describe(self) -> str:
+        """Return what may be written."""
+        return "true, false or {parameter: [choices]}"
+
+
 class FrontMatter(Model):
     """The YAML in the first comment of a tracker's file."""
 
@@ -96,7 +110,7 @@ class FrontMatter(Model):
     majorants: Annotated[tuple[Annotated[str, Choice(tuple(MAJORANTS))], ...], OneOrMore()] = tuple(
         MAJORANTS
     )
-    bounding: bool | dict[str, tuple[Any, ...]] = False
+    bounding: Annotated[bool | dict[str, tuple[Any, ...]], Bounding()] = False
     unbiased: Annotated[bool, Flag()] = True
     parameters: dict[str, Parameter] = {}
     state: dict[str, Annotated[str, Text("real, mask or index, or an array of them", STATE)]] = {}

@@ -142,7 +142,9 @@ def test_no_opencl_at_all(call, monkeypatch):
 
 
 def test_cases_are_listed_without_running(call, work):
-    code, out, _ = call("run", "small.yaml", "-N", "-a", "tightness=1,2", "-a", "tracker=delta,regular")
+    code, out, _ = call(
+        "run", "small.yaml", "-N", "-a", "tightness=1,2", "-a", "tracker=delta,regular"
+    )
     assert code == 0
     assert out.splitlines() == [
         "    1  transmittance/homogeneous-1/global/t1/delta/auto/strict",
@@ -169,7 +171,9 @@ def test_a_run_prints_a_table_and_names_its_files(call, work, selector, device):
     assert device.info.name in out
     assert "load" in out
     assert re.search(r"^analytic +\d+ +0 ", out, re.MULTILINE)
-    assert re.search(r"device time \d+ % of [\d.]+ s outside compilation; compilation [\d.]+ s", out)
+    assert re.search(
+        r"device time \d+ % of [\d.]+ s outside compilation; compilation [\d.]+ s", out
+    )
     for name in ("summary.csv", "samples.csv", "run.json"):
         assert f"wrote results/{folder.name}/{name}" in out
     # the newest run of the config is gone on with
@@ -218,8 +222,11 @@ parameters:
     assert "All [bold] of mine" in out
     assert "step = 0.5: how far (a length > 0, such as 20 or 20 m)" in out
     assert "way = up: way (up or down)" in out
-    (mine,) = (r for r in json.loads(call("list", "--trackers", "mine", "--json")[1])
-               if r["tracker"] == "mine")
+    (mine,) = (
+        r
+        for r in json.loads(call("list", "--trackers", "mine", "--json")[1])
+        if r["tracker"] == "mine"
+    )
     assert mine["majorant must bound"] is True
     assert mine["needs"] == "nothing"
 
@@ -244,8 +251,14 @@ def test_the_source_of_a_case(call, selector):
 
 
 def test_a_skipped_case_has_no_source(call):
-    code, out, err = call("source", "small.yaml", "-a", "medium={exponential: {sigma_t: 1, "
-                          "scale_height: 1}}", "-R", "regular")
+    code, out, err = call(
+        "source",
+        "small.yaml",
+        "-a",
+        "medium={exponential: {sigma_t: 1, scale_height: 1}}",
+        "-R",
+        "regular",
+    )
     assert (code, out) == (2, "")
     assert "has no source: regular needs cells" in err
 
@@ -316,7 +329,9 @@ def test_an_interrupted_run_can_be_completed(call, work, selector, number):
     )
     assert (work / "out" / "summary.csv").read_bytes() == before
     assert not (work / "out" / ".lock").exists()
-    assert json.loads((work / "out" / "run.json").read_text())["sessions"][0]["ended"] == "interrupted"
+    assert (
+        json.loads((work / "out" / "run.json").read_text())["sessions"][0]["ended"] == "interrupted"
+    )
     (work / "long.yaml").write_text(LONG)
     code, _, _ = call(*given, "--resume", "-a", "tracker=regular")
     assert code == 0

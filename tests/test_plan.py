@@ -254,6 +254,7 @@ def test_identity_is_canonical_json(expand):
                 "resolution": 128,
                 "seed": 1,
                 "sigma_t": 200.0,
+                "floor": 0.0,
                 "interpolation": "trilinear",
                 "size": [1.0, 1.0, 1.0],
             }

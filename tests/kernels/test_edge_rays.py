@@ -33,7 +33,10 @@ def lines_of_all_kinds():
     corners = np.array(list(itertools.product((0.0, 1.0), repeat=3)))
     kinds["corner to corner"] = (corners - (1.0 - 2.0 * corners), 1.0 - 2.0 * corners)
     kinds["from a corner"] = (corners, 1.0 - 2.0 * corners)
-    kinds["along a face, through its edges"] = ([[0.25, -1, -1], [0.5, 2, -1]], [[0, 1, 1], [0, -1, 1]])
+    kinds["along a face, through its edges"] = (
+        [[0.25, -1, -1], [0.5, 2, -1]],
+        [[0, 1, 1], [0, -1, 1]],
+    )
     kinds["from the boundary"] = ([[0, 0.3, 0.4], [1, 0.3, 0.4]], [[1, 0.2, 0.3], [-1, 0.2, -0.3]])
     kinds["from inside"] = ([[0.25, 0.5, 0.5], [0.3, 0.4, 0.2]], [[1, 0.2, 0.3], [0, 0, -1]])
     kinds["all but parallel"] = (
@@ -116,7 +119,9 @@ def test_one_voxel(rig, tracker, majorant, interpolation):
     centre = np.array([30.5, 20.5, 40.5]) / 64
     offsets[1] = np.cross(offsets[0], offsets[1])
     directions = unit(offsets[0])
-    origins = np.concatenate([centre - 2.0 * directions, centre - 2.0 * directions + 0.2 * unit(offsets[1])])
+    origins = np.concatenate(
+        [centre - 2.0 * directions, centre - 2.0 * directions + 0.2 * unit(offsets[1])]
+    )
     axes = {"tracker": tracker, "majorant": {"grid": {"resolution": 16}}, "lanes": 16}
     axes["majorant"] = "global" if majorant == "global" else axes["majorant"]
     flight = rig.flight(**axes, medium=medium, lines=(origins, np.tile(directions, (2, 1))))

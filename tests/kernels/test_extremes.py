@@ -12,7 +12,9 @@ EVERY = [
     ("analytic", "global"), ("regular", "global"), ("march", "global"),
     ("delta", "global"), ("delta", GRID), ("ratio", "global"), ("ratio", GRID),
 ]  # fmt: skip
-EACH = pytest.mark.parametrize(("tracker", "majorant"), EVERY, ids=lambda v: v if v != GRID else "grid")
+EACH = pytest.mark.parametrize(
+    ("tracker", "majorant"), EVERY, ids=lambda v: v if v != GRID else "grid"
+)
 UPWARD = {"orthographic": {"resolution": [4, 4]}}
 
 

@@ -31,7 +31,9 @@ class Lanes:
         names = [f"in{i}" for i in range(len(inputs))] + [f"out{i}" for i in range(len(outputs))]
         kinds = ["uint"] * len(inputs) + [{"bits": "uint", "real": "float"}[o] for o in outputs]
         arguments = ", ".join(f"__global {k} *{n}_" for k, n in zip(kinds, names, strict=True))
-        load = "".join(f"const bits in{i} = {self._at(f'in{i}_', 'at')};\n" for i in range(len(inputs)))
+        load = "".join(
+            f"const bits in{i} = {self._at(f'in{i}_', 'at')};\n" for i in range(len(inputs))
+        )
         declare = "".join(f"{kind} out{i};\n" for i, kind in enumerate(outputs))
         place = f"(at * {draws} + n * LANES)"
         store = "".join(self._store(f"out{i}", f"out{i}_", place) for i in range(len(outputs)))
@@ -57,7 +59,9 @@ class Lanes:
         return found
 
     def _at(self, name, place):
-        return f"{name}[{place}]" if self._lanes == 1 else f"vload{self._lanes}(0, {name} + {place})"
+        return (
+            f"{name}[{place}]" if self._lanes == 1 else f"vload{self._lanes}(0, {name} + {place})"
+        )
 
     def _store(self, value, name, place):
         if self._lanes == 1:

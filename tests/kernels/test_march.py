@@ -16,8 +16,13 @@ ALPHA = sidak(1e-3, 12)
 def marched(rig, estimand, placement, step, **options):
     tracker = {"march": {"step": float(step), "placement": placement}}
     return rig.flight(
-        tracker=tracker, medium=MEDIUM, rays=RAYS, estimand=estimand, arithmetic="double",
-        lanes=4, **options
+        tracker=tracker,
+        medium=MEDIUM,
+        rays=RAYS,
+        estimand=estimand,
+        arithmetic="double",
+        lanes=4,
+        **options,
     )
 
 
@@ -88,7 +93,11 @@ def test_free_path(rig, placement, order):
     which costs jittered steps an order.
     """
     exact = rig.flight(
-        tracker="analytic", medium=MEDIUM, rays=RAYS, estimand="free_path", arithmetic="double",
+        tracker="analytic",
+        medium=MEDIUM,
+        rays=RAYS,
+        estimand="free_path",
+        arithmetic="double",
         lanes=4,
     )
     exact_t = exact.record(8192).t
@@ -106,7 +115,11 @@ def test_each_free_path(rig, placement):
     flight = marched(rig, "free_path", placement, step)
     samples = flight.record(512)
     exact = rig.flight(
-        tracker="analytic", medium=MEDIUM, rays=RAYS, estimand="free_path", arithmetic="double",
+        tracker="analytic",
+        medium=MEDIUM,
+        rays=RAYS,
+        estimand="free_path",
+        arithmetic="double",
         lanes=4,
     )
     truth = exact.record(512)

@@ -74,7 +74,11 @@ def check_samples(flight: Flight, samples: Samples, alpha: float) -> None:
     depth = flight.medium.optical_depth(flight.segments)
     if case.estimand == "transmittance":
         still = moments.m2 == 0.0  # next-flight and the like vary in empty space too
-        check_empty(Moments(moments.count, moments.mean[still], moments.m2[still]), depth[still], flight.rounding)
+        check_empty(
+            Moments(moments.count, moments.mean[still], moments.m2[still]),
+            depth[still],
+            flight.rounding,
+        )
     if not tracker.unbiased:
         bias = float(np.sqrt(np.mean((moments.mean - expected) ** 2)))
         assert bias < COARSE, f"bias {bias}"

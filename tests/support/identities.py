@@ -153,7 +153,9 @@ def check_same_samples(one: Array, other: Array, lookups: tuple[Array, Array], r
     assert np.count_nonzero(bad) < 1e-5 * other_path.size, f"{np.count_nonzero(bad)} scores differ"
     error = abs(one.mean() - other.mean())
     flips = (differing + np.count_nonzero(bad)) / other_path.size
-    assert error <= 1000.0 * rounding * scale.mean() + flips * scale.max(), f"means differ by {error}"
+    assert error <= 1000.0 * rounding * scale.mean() + flips * scale.max(), (
+        f"means differ by {error}"
+    )
 
 
 def check_order(steps: Array, bias: Array, order: float, tolerance: float) -> None:

@@ -8,7 +8,9 @@ MEDIA = {
     "homogeneous": {"homogeneous": {"sigma_t": 1.5, "size": SIZE}},
     "linear": {"linear": {"bottom": 3.0, "top": 0.5, "size": SIZE}},
     "exponential": {"exponential": {"sigma_t": 6.0, "scale_height": 0.3, "size": SIZE}},
-    "gaussian": {"gaussian": {"sigma_t": 6.0, "width": 0.2, "center": [0.4, 0.8, 0.3], "size": SIZE}},
+    "gaussian": {
+        "gaussian": {"sigma_t": 6.0, "width": 0.2, "center": [0.4, 0.8, 0.3], "size": SIZE}
+    },
     "cosine": {
         "cosine": {"sigma_t": 2.0, "amplitude": 0.9, "periods": 2.5, "phase": 0.7, "size": SIZE}
     },
