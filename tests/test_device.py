@@ -24,7 +24,16 @@ NOTHING = "__kernel void track(__global uint *out) { out[get_global_id(0)] = 7; 
 
 @pytest.mark.parametrize(
     "selector",
-    ["xeon", "XEON", "portable", "3.0", "all", " all ", "Language / pthread", "Portable  Computing"],
+    [
+        "xeon",
+        "XEON",
+        "portable",
+        "3.0",
+        "all",
+        " all ",
+        "Language / pthread",
+        "Portable  Computing",
+    ],
 )
 def test_selectors_that_match(selector):
     assert matches(INFO, selector)
@@ -91,7 +100,9 @@ def test_no_device_at_all_says_what_to_install(monkeypatch):
         raise cl.LogicError("clGetPlatformIDs failed: PLATFORM_NOT_FOUND_KHR")
 
     offer(monkeypatch, no_devices())
-    with pytest.raises(DeviceError, match=r"no OpenCL device found; `pip install 'freepath\[pocl\]'"):
+    with pytest.raises(
+        DeviceError, match=r"no OpenCL device found; `pip install 'freepath\[pocl\]'"
+    ):
         open_devices([])
     monkeypatch.setattr(devices.cl, "get_platforms", none)
     with pytest.raises(DeviceError, match="pip install"):

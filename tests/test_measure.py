@@ -198,7 +198,9 @@ def test_rounds_are_interleaved_in_random_order():
 
     benches = [bench_of(Telling(name), samples=1000) for name in "abcdef"]
     order.clear()
-    ended = [bench.timed.name for bench in interleave(benches, 7, None) if bench.measurement.stopped]
+    ended = [
+        bench.timed.name for bench in interleave(benches, 7, None) if bench.measurement.stopped
+    ]
     assert sorted(ended) == list("abcdef")
     passes = [order[i : i + 6] for i in range(0, 60, 6)]
     assert all(sorted(one) == list("abcdef") for one in passes)

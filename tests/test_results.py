@@ -5,8 +5,18 @@ import math
 import numpy as np
 import pytest
 from freepath.errors import FreepathError
-from freepath.results import COLUMNS, KEY, PLACE, SAMPLE_COLUMNS, SUMMARY, TEXTS, ResultFolder
-from freepath.results import key_of, read_rows, records
+from freepath.results import (
+    COLUMNS,
+    KEY,
+    PLACE,
+    SAMPLE_COLUMNS,
+    SUMMARY,
+    TEXTS,
+    ResultFolder,
+    key_of,
+    read_rows,
+    records,
+)
 
 
 def row_of(case="a", **given):
@@ -57,7 +67,10 @@ def lines_of(folder, name=SUMMARY):
 
 
 def samples_of(folder):
-    return [(r["case_id"], r["device"], r["round"]) for r in read_rows(folder / "samples.csv", SAMPLE_COLUMNS)]
+    return [
+        (r["case_id"], r["device"], r["round"])
+        for r in read_rows(folder / "samples.csv", SAMPLE_COLUMNS)
+    ]
 
 
 def test_every_row_has_every_column(tmp_path):
@@ -96,7 +109,9 @@ def test_rows_are_there_as_soon_as_they_are_appended(tmp_path):
 
 def test_what_is_in_the_folder_is_not_overwritten(tmp_path):
     written(tmp_path, row_of())
-    with pytest.raises(FreepathError, match="already holds summary.csv, samples.csv, run.json; go on"):
+    with pytest.raises(
+        FreepathError, match="already holds summary.csv, samples.csv, run.json; go on"
+    ):
         ResultFolder(tmp_path)
 
 
@@ -215,7 +230,11 @@ def test_two_do_not_write_to_one_folder(tmp_path):
         resumed(tmp_path, row_of())
     first.close()
     resumed(tmp_path, row_of())
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["run.json", "samples.csv", "summary.csv"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "run.json",
+        "samples.csv",
+        "summary.csv",
+    ]
 
 
 def test_run_json_is_read_where_it_can_be(tmp_path):

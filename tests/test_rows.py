@@ -218,5 +218,3 @@ def test_a_row_a_round(base):
     assert (first["case_id"], first["device"], first["run_id"]) == (base["case_id"], "thing", "run")
     assert (second["samples"], second["estimate"], second["variance"]) == (400, 0.5, 0.25)
     assert (third["samples"], third["variance"]) == (4, None)
-
-

@@ -293,7 +293,9 @@ def test_a_wrong_tracker_is_a_mismatch(go, work):
 def test_a_thick_medium_is_no_mismatch(go):
     code, _ = go("-a", "medium={homogeneous: {sigma_t: 60}}", "-a", "tracker=delta,regular")
     assert code == 0
-    delta, regular = (next(r for r in rows().values() if r["tracker"] == t) for t in ("delta", "regular"))
+    delta, regular = (
+        next(r for r in rows().values() if r["tracker"] == t) for t in ("delta", "regular")
+    )
     assert (delta["estimate"], delta["time_to_1pct_s"]) == ("0.0", "")
     assert delta["reason"].startswith("all scores are 0")
     assert float(regular["bias"]) == pytest.approx(0, abs=1e-3 * math.exp(-60))

@@ -65,7 +65,11 @@ def test_a_source_has_what_the_case_needs_and_nothing_else():
             {"majorant/grid.cl", "walk/dda.cl"},
             {"majorant/global.cl"},
         ),
-        ({"needs": frozenset({"closed_form"})}, {"closed_form/homogeneous.cl"}, {"majorant/global.cl"}),
+        (
+            {"needs": frozenset({"closed_form"})},
+            {"closed_form/homogeneous.cl"},
+            {"majorant/global.cl"},
+        ),
         ({"needs": frozenset({"cells"})}, {"cells/homogeneous.cl"}, {"majorant/global.cl"}),
     ],
 )
@@ -109,7 +113,9 @@ def test_lines_are_numbered_as_in_their_files():
 
 def test_numbers_are_declared_in_the_order_in_which_they_are_given():
     structure = Structure(**DELTA | {"tracker_numbers": ("step",), "medium_numbers": ("a", "b")})
-    declared = re.findall(r"typedef struct \{ SCALAR (.+); \} (\w+)Numbers;", compose(structure).text)
+    declared = re.findall(
+        r"typedef struct \{ SCALAR (.+); \} (\w+)Numbers;", compose(structure).text
+    )
     assert [group for _, group in declared] == ["Box", "Medium", "Majorant", "Tracker"]
     names = [name for names, _ in declared for name in names.split(", ")]
     assert names == ["extent_x", "extent_y", "extent_z", "a", "b", "sigma_t", "step"]

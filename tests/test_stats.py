@@ -37,7 +37,9 @@ def test_blocks_agree_with_numpy(blocks):
     scores = np.random.default_rng(blocks).normal(3.0, 0.1, size=(4, 840))
     parts = [moments_of(part) for part in np.split(scores, blocks, axis=1)]
     merged = merge_blocks(
-        np.array([part.mean for part in parts]), np.array([part.m2 for part in parts]), 840 // blocks
+        np.array([part.mean for part in parts]),
+        np.array([part.m2 for part in parts]),
+        840 // blocks,
     )
     assert merged.count == 840
     np.testing.assert_allclose(merged.mean, scores.mean(1), rtol=1e-14)

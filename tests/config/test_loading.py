@@ -299,7 +299,7 @@ BAD_TOP = [
     (GOOD + "stop: {error: 1 s}\n", 6, 15, "stop.error: expected a fraction > 0 and <= 1"),
     (GOOD + "stop: {error: 0}\n", 6, 15, "stop.error: expected a fraction > 0 and <= 1"),
     (GOOD + "stop: {at_most: 3 m}\n", 6, 17, "stop.at_most: expected a time > 0, such as 10 or 10"),
-    (GOOD + "stop: {samples: 0}\n", 6, 17, "stop.samples: expected an integer >= 1, got 0"),
+    (GOOD + "stop: {samples: 0}\n", 6, 17, "stop.samples: expected an integer >= 2, got 0"),
     (GOOD + "stop: {at_least: 1}\n", 6, 8, "stop.at_least: unknown key; did you mean 'at_most'?"),
     (GOOD + "include: 3\n", 6, 10, "include: expected a mapping with estimand, medium"),
     (GOOD + "include: [{}]\n", 6, 11, "include[0]: expected at least one axis, got an empty mapp"),
