@@ -194,7 +194,10 @@ def _print_times(console: Console, sweep: Run) -> None:
 
 def _show_only(options: Namespace, cases: list[Case]) -> int:
     if options.json:
-        print(json.dumps([case.identity() | {"name": case.name} for case in cases], indent=1))
+        named = [
+            case.identity() | {"name": case.name, "skipped": case.skip_reason} for case in cases
+        ]
+        print(json.dumps(named, indent=1))
         return 0
     for case in cases:
         reason = f"  (skipped: {case.skip_reason})" if case.skip_reason else ""

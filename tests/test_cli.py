@@ -1,13 +1,15 @@
 import json
 import os
 import re
+import shlex
 import signal
 import subprocess
 import sys
 import time
 
 import pytest
-from freepath import cli, device as devices
+from freepath import cli
+from freepath import device as devices
 from freepath.arguments import LISTS
 from freepath.results import read_rows
 
@@ -38,7 +40,11 @@ def call(work, capsys):
 
 def command(*arguments, **options):
     return subprocess.run(
-        [sys.executable, "-m", "freepath", *arguments], capture_output=True, text=True, **options
+        [sys.executable, "-m", "freepath", *arguments],
+        check=False,
+        capture_output=True,
+        text=True,
+        **options,
     )
 
 
@@ -89,15 +95,13 @@ MISTAKES = [
     ("small.yaml -o small.yaml", "small.yaml: is a file, expected a folder"),
     ("small.yaml -o small.yaml/x", "small.yaml/x: cannot be written to: Not a directory"),
     ("small.yaml -o full", "full: already holds summary.csv"),
-    ("small.yaml -a medium={volume:{file:\\ no.npy}}", "no.npy: no such file in "),
-    ("small.yaml -a medium={volume:{file:\\ small.yaml}}", "small.yaml: "),
+    ("small.yaml -a 'medium={volume: {file: no.npy}}'", "no.npy: no such file in "),
+    ("small.yaml -a 'medium={volume: {file: small.yaml}}'", "small.yaml: "),
 ]
 
 
 @pytest.mark.parametrize(("words", "message"), MISTAKES)
 def test_mistakes(call, work, selector, words, message):
-    import shlex
-
     (work / "bad").mkdir()
     (work / "bad" / "mine.cl").write_text("int x;")
     (work / "full").mkdir()
@@ -263,7 +267,7 @@ def test_a_skipped_case_has_no_source(call):
     assert "has no source: regular needs cells" in err
 
 
-@pytest.mark.parametrize("shell", ["bash", "zsh", "tcsh"])
+@pytest.mark.parametrize("shell", ["bash", "zsh"])
 def test_completion(call, shell):
     code, out, _ = call("--print-completion", shell)
     assert code == 0
@@ -282,7 +286,9 @@ def test_what_needs_no_device_loads_none(words):
         "heavy = {'pyopencl', 'scipy', 'numpy', 'OpenImageIO', 'pint'} & set(sys.modules)\n"
         "sys.exit(f'loads {heavy}' if heavy else 0)"
     )
-    done = subprocess.run([sys.executable, "-c", script, *words], capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-c", script, *words], check=False, capture_output=True, text=True
+    )
     assert done.returncode == 0, done.stderr
 
 
@@ -295,16 +301,16 @@ def test_a_module_too():
 @pytest.mark.parametrize("words", ["list", "run quick -N"])
 def test_a_reader_that_has_seen_enough(words):
     script = f"{sys.executable} -m freepath {words} | true; exit ${{PIPESTATUS[0]}}"
-    done = subprocess.run(["bash", "-c", script], capture_output=True, text=True)
+    done = subprocess.run(["bash", "-c", script], check=False, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
 
 
-LONG = SWEEP.replace("stop: {samples: 20}", "stop: {at_most: 60 s, error: 0.0001%}")
+# regular has no variance and is done at once; delta would take all the time that it is given
+LONG = SWEEP.replace("{samples: 20}", "{at_most: 40 s, error: 0.0001%, time_noise: 100%}")
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_run_can_be_completed(call, work, selector, number):
-    """Two cases are short and end; the two others would take a minute each."""
     (work / "long.yaml").write_text(LONG)
     given = ["run", "long.yaml", "-d", selector, "-o", "out"]
     running = subprocess.Popen(

@@ -5,8 +5,18 @@ import math
 import numpy as np
 import pytest
 from freepath.errors import FreepathError
-from freepath.results import COLUMNS, KEY, PLACE, SAMPLE_COLUMNS, SUMMARY, TEXTS, ResultFolder
-from freepath.results import key_of, read_rows, records
+from freepath.results import (
+    COLUMNS,
+    KEY,
+    PLACE,
+    SAMPLE_COLUMNS,
+    SUMMARY,
+    TEXTS,
+    ResultFolder,
+    key_of,
+    read_rows,
+    records,
+)
 
 
 def row_of(case="a", **given):

@@ -157,6 +157,8 @@ def test_pint_is_imported_only_for_a_unit():
     code = (
         "import sys; from freepath.config import quantity as q;"
         "q.Number('length').check(3, None); q.Number('fraction').check('1%', None);"
+        "assert q.Number('time').check('10 s', None) == 10;"
+        "assert q.Number('1/length').check('3 /m', None) == 3;"
         "assert 'pint' not in sys.modules;"
         "q.Number('length').check('3 km', None); assert 'pint' in sys.modules"
     )

@@ -14,7 +14,10 @@ from support.identities import (
     check_empty,
     check_exact,
     check_free_path,
+    check_independence,
+    check_inversion,
     check_mean,
+    roundings,
 )
 from support.media import MAJORANTS, MEDIA
 from support.rig import Flight, Rig, Samples
@@ -22,6 +25,7 @@ from support.truth import depth_at
 
 Axes = dict[str, Any]
 
+MANY = 100  # rays over which a sum is close enough to a normal distribution
 DISTRIBUTED = 128  # samples of each ray of which the depth is looked up: that is dear in a grid
 VARIES = 100.0  # roundings that a sample may be off
 COARSE = 0.05  # what a tracker that says it is biased may be off with its default parameters
@@ -86,12 +90,18 @@ def check_samples(flight: Flight, samples: Samples, alpha: float) -> None:
         # an estimator whose variance vanishes here, and whose samples differ by rounding alone
         np.testing.assert_allclose(moments.mean, expected, rtol=VARIES * flight.rounding)
     elif samples.round.variance == 0.0:
-        pieces = np.count_nonzero(flight.medium.pieces(flight.segments).length, axis=1)
+        pieces = _pieces(flight)
         check_exact(moments, expected, flight.rounding, _largest_depth(flight), pieces)
     else:
-        check_mean(moments, expected, alpha / 2)
+        check_mean(moments, expected, alpha / 3)
+        if len(expected) > MANY:
+            check_independence(samples.scores(case.estimand), alpha / 3)
         if case.estimand == "free_path" and (samples.weight == 1.0).all():
-            check_distribution(flight, samples, alpha / 2, DISTRIBUTED)
+            check_distribution(flight, samples, alpha / 3, DISTRIBUTED)
+
+
+def _pieces(flight: Flight) -> np.ndarray:
+    return np.count_nonzero(flight.medium.pieces(flight.segments).length, axis=1)
 
 
 def _largest_depth(flight: Flight) -> np.ndarray:
@@ -108,3 +118,11 @@ def check_distribution(
     depth = flight.medium.optical_depth(flight.segments)
     at = depth_at(flight.medium, flight.segments, samples.t[:, :at_most])
     check_free_path(at, samples.escaped[:, :at_most], depth, alpha)
+
+
+def check_each_path(flight: Flight, samples: Samples, target: np.ndarray) -> None:
+    """Free paths end where the optical depths that were sampled for them are reached."""
+    depth = flight.medium.optical_depth(flight.segments)
+    at = depth_at(flight.medium, flight.segments, samples.t)
+    bound = flight.rounding * roundings(_pieces(flight)) * np.maximum(_largest_depth(flight), 1.0)
+    check_inversion(at, target, samples.escaped, depth, bound)

@@ -90,24 +90,61 @@ def check_empty(moments: Moments, depth: Array, rounding: float) -> None:
     assert not (lost > 4.0 * rounding).any(), f"empty space takes {lost.max():.2g}"
 
 
+def check_independence(scores: Array, alpha: float) -> None:
+    """Samples (rays, samples) have nothing to do with those of other rays, nor with each other.
+
+    If they had not, sums over rays would vary more or less than by the sum of the variances, and
+    neighbouring samples of a ray would correlate. Both have a normal distribution, for many rays.
+    """
+    deviation = scores - scores.mean(axis=1, keepdims=True)
+    count, variance = scores.shape[1], deviation.var(axis=1)
+    total = variance.sum()
+    excess = (deviation.sum(axis=0) ** 2).mean() / total - 1.0
+    products = (deviation[:, 1:] * deviation[:, :-1]).mean(axis=1)
+    serial = products.sum() / np.sqrt((variance**2).sum() / count)
+    z = np.array([excess / np.sqrt(2.0 / count), serial])
+    require(2.0 * stats.norm.sf(np.abs(z)), alpha, "independence (of rays, of samples)")
+
+
+def check_inversion(
+    depth_at: Array, target: Array, escaped: NDArray[np.bool_], depth: Array, bound: Array
+) -> None:
+    """Each path ends where its sampled optical depth `target` is reached, up to `bound`.
+
+    For trackers that draw the depth first: an analytic one with the same seed says what it was.
+    """
+    sure = np.abs(target - depth[:, None]) > bound[:, None]
+    wrong = sure & (escaped != (target > depth[:, None]))
+    assert not wrong.any(), f"{np.count_nonzero(wrong)} paths end on the wrong side of the ray's end"
+    error = np.where(escaped, 0.0, np.abs(depth_at - target)) / bound[:, None]
+    assert error.max() <= 1.0, f"a free path is off by {error.max():.3g} times the bound of rounding"
+
+
+def roundings(pieces: Array) -> Array:
+    """How many roundings of the size of majorant x length an optical depth has at most.
+
+    `pieces` counts the parts of each ray that it is summed over. Each adds at most eight: three to
+    where it starts and as many to where it ends, one of its product and one of the sum. A closed
+    form adds at most 64: 16 of erf (OpenCL 7.4), 8 of sin, cos and exp, and up to 32 of arguments
+    of size 16.
+    """
+    return 8.0 * pieces + 64.0
+
+
 def check_exact(
     moments: Moments, expected: Array, rounding: float, depth: Array, pieces: Array
 ) -> None:
     """An estimator without variance returns the transmittance up to rounding.
 
-    `depth` bounds the optical depth of each ray from above by majorant x length, `pieces` counts
-    the parts that it is summed over. Each part adds at most eight roundings to the depth: three to
-    where it starts and as many to where it ends, one of its product and one of the sum. A closed
-    form adds at most 64: 16 of erf (OpenCL 7.4), 8 of sin, cos and exp, and up to 32 of arguments
-    of size 16. They add up in the worst case, and as a random walk on average over the rays.
+    `depth` bounds the optical depth of each ray from above by majorant x length. Roundings add up
+    in the worst case, and as a random walk on average over the rays.
     """
     assert not moments.m2.any(), "an estimator that claims to be exact varies"
-    roundings = 8.0 * pieces + 64.0
     scale = rounding * np.maximum(depth, 1.0)
     error = np.abs(moments.mean - expected) / np.maximum(expected, 1e-30)  # far below: underflow
-    worst = np.max(error / (roundings * scale))
+    worst = np.max(error / (roundings(pieces) * scale))
     assert worst <= 1.0, f"error {worst:.3g} times the bound of rounding"
-    average = np.sqrt(np.mean((error / scale) ** 2 / roundings))
+    average = np.sqrt(np.mean((error / scale) ** 2 / roundings(pieces)))
     assert average <= 1.0, f"error {average:.3g} times that of random rounding"
 
 

@@ -32,7 +32,8 @@ class Change:
 
     def apply(self, text: str) -> str:
         """Replace the one place; a test whose defect has no place any more must not pass."""
-        assert text.count(self.old) == 1, f"{text.count(self.old)} places for {self.old!r}"
+        if text.count(self.old) != 1:
+            raise LookupError(f"{text.count(self.old)} places for {self.old!r}")
         return text.replace(self.old, self.new)
 
 
