@@ -41,7 +41,13 @@ def test_closed_forms(kind):
 @pytest.mark.parametrize("interpolation", ["trilinear", "nearest"])
 def test_cloud(interpolation):
     model = SimpleNamespace(
-        kind="cloud", resolution=8, seed=3, sigma_t=50.0, interpolation=interpolation, size=SIZE
+        kind="cloud",
+        resolution=8,
+        seed=3,
+        sigma_t=50.0,
+        floor=0.0,
+        interpolation=interpolation,
+        size=SIZE,
     )
     medium = build_medium(model)
     assert medium.kernel == f"grid_{interpolation}"
@@ -62,9 +68,29 @@ def test_volume_size_and_scale(tmp_path):
     assert single.world_box()[-1].tolist() == [8.0, 6.0, 4.0]
 
 
+def test_the_floor_of_a_cloud_is_its_homogeneous_part():
+    model = SimpleNamespace(
+        kind="cloud",
+        resolution=8,
+        seed=3,
+        sigma_t=50.0,
+        floor=0.4,
+        interpolation="nearest",
+        size=SIZE,
+    )
+    expected = 50.0 * (0.4 + 0.6 * cloud(8, 3).astype(np.float64))
+    np.testing.assert_allclose(build_medium(model).voxels, expected, rtol=1e-6)
+
+
 def test_a_scaled_cloud_that_overflows_is_refused():
     model = SimpleNamespace(
-        kind="cloud", resolution=4, seed=1, sigma_t=1e39, interpolation="nearest", size=SIZE
+        kind="cloud",
+        resolution=4,
+        seed=1,
+        sigma_t=1e39,
+        floor=0.0,
+        interpolation="nearest",
+        size=SIZE,
     )
     with pytest.raises(VolumeError, match="cloud 4: densities that cannot be used: .* too large"):
         build_medium(model)
