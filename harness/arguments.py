@@ -20,6 +20,7 @@ examples:
   freepath run my.yaml -R delta -E grid     only cases named delta, none named grid
   freepath run my.yaml -o out --resume      go on where an interrupted run stopped
   freepath list trackers                    what can be compared
+  freepath report out -o picture.png        its errors over device time, as a picture
   freepath source quick --case 3            the OpenCL C that case 3 runs
 """
 
@@ -40,6 +41,7 @@ def parser() -> argparse.ArgumentParser:
     )
     commands = top.add_subparsers(dest="command", metavar="COMMAND", required=True)
     _add_run(commands)
+    _add_report(commands)
     _add_source(commands)
     _add_list(commands)
     _add_devices(commands)
@@ -111,6 +113,26 @@ def _add_trackers(command: Any) -> None:
         metavar="DIR",
         help="a folder with further trackers, one .cl file each; may be repeated",
     ).complete = shtab.DIRECTORY
+
+
+def _add_report(commands: Any) -> None:
+    report = commands.add_parser(
+        "report",
+        help="draw what accuracy costs in time",
+        description="Draw the RMSE of every case of a result over device time, as .svg or .png.",
+        allow_abbrev=False,
+    )
+    report.add_argument(
+        "result", type=Path, metavar="RESULT", help="the folder of a run"
+    ).complete = shtab.DIRECTORY
+    report.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        default=Path("report.svg"),
+        metavar="FILE",
+        help="where to draw it (default: report.svg)",
+    ).complete = shtab.FILE
 
 
 def _add_source(commands: Any) -> None:

@@ -26,8 +26,8 @@ from pydantic import ValidationInfo, create_model, field_validator
 
 NEEDS = ("majorant", "control", "closed_form", "cells")
 STATE = r"(real|mask|index)(\[[1-9][0-9]?\])?"
-"""What a tracker may keep of a path: types that main.cl can merge under a mask, and arrays of them as
-scratch, which a sample fills before it reads them."""
+"""What a tracker may keep of a path: types that main.cl can merge under a mask, and arrays of them
+as scratch, which a sample fills before it reads them."""
 IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 # fmt: off
 C_WORDS = frozenset((

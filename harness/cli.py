@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; returns its exit code. A user's mistake is a message, never a traceback."""
     options = parser().parse_args(arguments)
-    command = {"run": _run, "source": _source, "list": _list, "devices": _devices}[options.command]
+    command = COMMANDS[options.command]
     try:
         with _terminated_like_interrupted():
             code = command(options)
@@ -275,3 +275,19 @@ def _console(*, stderr: bool = False) -> Console:
 
     console = Plain(stderr=stderr)
     return console if console.is_terminal else Plain(stderr=stderr, width=160)
+
+
+def _report(options: Namespace) -> int:
+    from freepath import report
+
+    print(f"wrote {report.write(options.result, options.output)}")
+    return 0
+
+
+COMMANDS = {
+    "run": _run,
+    "report": _report,
+    "source": _source,
+    "list": _list,
+    "devices": _devices,
+}

@@ -1,4 +1,4 @@
-"""Majorants and controls of a medium: for all of it, for each cell of a grid or leaf of an octree."""
+"""Majorants and controls of a medium: for all of it, or for each cell of a grid or an octree."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-
 from freepath.octree import leaf_sizes, over_leaves
 from freepath.scene import Medium
 
@@ -18,7 +17,7 @@ POINTS = 4
 
 @dataclass(frozen=True)
 class Majorant:
-    """What a kernel reads of a majorant: its numbers, and float32 arrays behind each other or None."""
+    """What a kernel reads of a majorant: its numbers, and float32 arrays one behind another."""
 
     numbers: dict[str, float]
     data: np.ndarray | None = None
@@ -32,7 +31,7 @@ EXCESS = 1e-6
 
 @dataclass(frozen=True)
 class Cells:
-    """Bounds and means of the extinction (1/world length) over the cells of a majorant [nz, ny, nx]."""
+    """Bounds and means of the extinction (1/world length) over cells [nz, ny, nx]."""
 
     lower: np.ndarray
     upper: np.ndarray
@@ -67,9 +66,9 @@ def build(
 ) -> Majorant:
     """Make a majorant from the medium's bounds over `cells_of(model)`, times tightness.
 
-    `bounds` are minorant and majorant of each cell, [nz, ny, nx] (1/world length). With `control` (a
-    tracker's parameters `control` and `share`) the extinction less the control is bounded instead:
-    |sigma_t - control| in each cell, times tightness.
+    `bounds` are minorant and majorant of each cell, [nz, ny, nx] (1/world length). With `control`
+    (a tracker's parameters `control` and `share`) the extinction less the control is bounded
+    instead: |sigma_t - control| in each cell, times tightness.
     """
     cells = _joined(
         model, medium, bounds, with_means=bool(control) and control["control"] == "mean"
@@ -129,7 +128,7 @@ def _controls(bounds: Cells, control: Mapping[str, Any]) -> np.ndarray:
 
 
 def _means(medium: Medium, cells: tuple, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
-    """The mean extinction of each cell [nz, ny, nx], from points inside; of the whole box exactly."""
+    """The mean extinction of each cell [nz, ny, nx], from points; of the whole box exactly."""
     if cells == (1, 1, 1):
         return np.full((1, 1, 1), medium.mean())
     axes = [

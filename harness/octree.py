@@ -31,7 +31,7 @@ def leaf_sizes(majorants: np.ndarray, slack: float) -> np.ndarray:
 def over_leaves(
     values: np.ndarray, sizes: np.ndarray, reduce: Callable[..., np.ndarray]
 ) -> np.ndarray:
-    """Give each cell the reduction (np.min, np.max, np.mean) of the values [n, n, n] in its leaf."""
+    """Give each cell the reduction (np.min, np.max, np.mean) of the values in its leaf."""
     result = values.copy()
     size = 2
     while size <= values.shape[0]:

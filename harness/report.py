@@ -125,7 +125,9 @@ def write(result: Path, output: Path) -> Path:
     if output.suffix.lower() not in FORMATS:
         expected = " or ".join(FORMATS)
         raise FreepathError(f"{output}: expected a name that ends in {expected}")
-    summary = result / SUMMARY if result.is_dir() else result
+    summary = result / SUMMARY
+    if not summary.is_file():
+        raise FreepathError(f"{result}: expected the folder of a run, with {SUMMARY} in it")
     picture = chart(read_rows(summary))
     try:
         picture.save(output, scale_factor=2.0)

@@ -101,7 +101,9 @@ DEFECTS = {
     "a null probability wrong by 2 %": Defect(
         whole,
         "mean",
-        Change("real null = sigma_n / path->majorant", "real null = 0.98f * sigma_n / path->majorant"),
+        Change(
+            "real null = sigma_n / path->majorant", "real null = 0.98f * sigma_n / path->majorant"
+        ),
         RATIO,
     ),
     "a weight that is not divided by the majorant": Defect(
@@ -123,13 +125,19 @@ DEFECTS = {
         RATIO,
     ),
     "collisions too often by 2 %": Defect(
-        whole, "mean", Change("uniform(rng) * path->majorant,", "uniform(rng) * 0.98f * path->majorant,"), DELTA
+        whole,
+        "mean",
+        Change("uniform(rng) * path->majorant,", "uniform(rng) * 0.98f * path->majorant,"),
+        DELTA,
     ),
     "a distance that starts anew in each cell": Defect(
         whole, "mean", Change("draw = choose(crossing, draw - depth, draw);", ""), DELTA
     ),
     "the majorant of the cell beside": Defect(
-        cleanness, "violations", Change("(j + 1) * row + (i + 1);", "j * row + (i + 1);"), DELTA | {"medium": "trilinear"}
+        cleanness,
+        "violations",
+        Change("(j + 1) * row + (i + 1);", "j * row + (i + 1);"),
+        DELTA | {"medium": "trilinear"},
     ),
     "a walk that leaves one cell too late": Defect(
         cleanness, "violations", Change("(SCALAR)1 - where,", "(SCALAR)2 - where,"), DELTA
@@ -154,10 +162,16 @@ DEFECTS = {
         ANALYTIC | {"medium": "homogeneous"},
     ),
     "one stream for all samples of a ray": Defect(
-        whole, "varies|error", Change("{ray, low, high, (bits)0}", "{ray, (bits)0, high, (bits)0}"), RATIO
+        whole,
+        "varies|error",
+        Change("{ray, low, high, (bits)0}", "{ray, (bits)0, high, (bits)0}"),
+        RATIO,
     ),
     "one stream for all rays": Defect(
-        whole, "independence|mean", Change("{ray, low, high, (bits)0}", "{(bits)0, low, high, (bits)0}"), RATIO
+        whole,
+        "independence|mean",
+        Change("{ray, low, high, (bits)0}", "{(bits)0, low, high, (bits)0}"),
+        RATIO,
     ),
     "samples numbered within their block": Defect(
         same_samples,
@@ -177,7 +191,10 @@ DEFECTS = {
     "the last cell of a ray left out": Defect(
         whole,
         "error",
-        Change("path->depth = choose(path->live, depth,", "path->depth = choose(path->live & less(t_exit, path->length), depth,"),
+        Change(
+            "path->depth = choose(path->live, depth,",
+            "path->depth = choose(path->live & less(t_exit, path->length), depth,",
+        ),
         REGULAR | {"medium": "layered"},
     ),
     "a layer walked into beyond the last": Defect(

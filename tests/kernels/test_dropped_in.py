@@ -53,14 +53,19 @@ static void step(Path *path, const Scene *scene, Rng *rng)
     const mask before = path->live;
     const mask here = next_tentative(path, scene, rng);
     const real real_share = sigma_t_at_tentative(path, scene, here) / path->majorant;
-    path->state.product = choose(here, path->state.product * ((SCALAR)1 - real_share), path->state.product);
-    path->weight = choose(before & ~path->live, path->state.product / scene->tracker.scale, path->weight);
+    const real product = path->state.product * ((SCALAR)1 - real_share);
+    path->state.product = choose(here, product, path->state.product);
+    const real weight = path->state.product / scene->tracker.scale;
+    path->weight = choose(before & ~path->live, weight, path->weight);
 }
 """
 TRACKERS = {"signed_delta": SIGNED_DELTA, "kept_ratio": KEPT_RATIO}
 WRONG = {
     "signed_delta": [("* sign *", "*"), ("sign * total * path->mean_free_path", "sign")],
-    "kept_ratio": [("/ scene->tracker.scale", ""), ("((SCALAR)1 - real_share)", "exp(-real_share)")],
+    "kept_ratio": [
+        ("/ scene->tracker.scale", ""),
+        ("((SCALAR)1 - real_share)", "exp(-real_share)"),
+    ],
 }
 CONFIG = """
 name: dropped
@@ -118,7 +123,8 @@ def test_checked(folder, rig, name):
 
 
 @pytest.mark.parametrize(
-    ("name", "old", "new"), [(name, *change) for name, changes in WRONG.items() for change in changes]
+    ("name", "old", "new"),
+    [(name, *change) for name, changes in WRONG.items() for change in changes],
 )
 def test_a_wrong_one_is_rejected(folder, rig, tmp_path, name, old, new):
     shutil.copytree(folder, tmp_path / "wrong")

@@ -115,9 +115,13 @@ def check_inversion(
     """
     sure = np.abs(target - depth[:, None]) > bound[:, None]
     wrong = sure & (escaped != (target > depth[:, None]))
-    assert not wrong.any(), f"{np.count_nonzero(wrong)} paths end on the wrong side of the ray's end"
+    assert not wrong.any(), (
+        f"{np.count_nonzero(wrong)} paths end on the wrong side of the ray's end"
+    )
     error = np.where(escaped, 0.0, np.abs(depth_at - target)) / bound[:, None]
-    assert error.max() <= 1.0, f"a free path is off by {error.max():.3g} times the bound of rounding"
+    assert error.max() <= 1.0, (
+        f"a free path is off by {error.max():.3g} times the bound of rounding"
+    )
 
 
 def roundings(pieces: Array) -> Array:

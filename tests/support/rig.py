@@ -113,7 +113,7 @@ class Rig:
         return rig
 
     def volume(self, voxels: np.ndarray, **keys: Any) -> dict[str, Any]:
-        """A medium of a config from voxels [z, y, x], by way of a file as a user would give them."""
+        """A medium of a config from voxels [z, y, x], by way of a file as a user gives them."""
         path = self.folder / f"{source.combined_hash(np.ascontiguousarray(voxels).tobytes())}.npy"
         np.save(path, voxels.astype(np.float32))
         return {"volume": {"file": str(path), **keys}}
@@ -140,7 +140,7 @@ class Rig:
         change: Change | None = None,
         **axes: Any,
     ) -> Flight:
-        """Build a case. `lines` are origins and directions of its rays, instead of random chords."""
+        """Build a case. `lines` are origins and directions of its rays, not random chords."""
         case = self.case(**axes)
         key = str(case.medium.as_dict())
         if key not in self._media:
