@@ -75,6 +75,8 @@ class Measurement:
     moments: Moments | None = None
     stopped: str = ""
     """Why it ended: precise, budget, samples or failed; '' while it goes on."""
+    spent_s: float = 0.0
+    """Wall time of the rounds."""
     time_wall_s: float = 0.0
     """Wall time of calibration, counting and rounds, without building."""
     time_device_s: float = 0.0
@@ -85,6 +87,7 @@ class Measurement:
     def add(self, one: Round) -> None:
         """Add a measured round; its moments are kept merged only, or they would fill the memory."""
         self.rounds.append(replace(one, moments=None))
+        self.spent_s += one.time_wall_s
         self.moments = self.moments.merged(one.moments) if self.moments else one.moments
 
     @property
@@ -101,11 +104,6 @@ class Measurement:
     def variances(self) -> list[float]:
         """Variance of one sample, of each full round."""
         return [one.variance for one in self.full_rounds]
-
-    @property
-    def spent_s(self) -> float:
-        """Wall time of the rounds."""
-        return sum(one.time_wall_s for one in self.rounds)
 
     def total(self, counter: str) -> int:
         """A counter over all measured rounds."""

@@ -15,6 +15,7 @@ from scipy import stats
 
 Array = NDArray[np.float64]
 
+RESOLVED = 0.05  # relative standard error of a mean that says something
 GROUPS = 8  # of rays with like expectations: errors of thin and of thick rays must not cancel
 
 
@@ -57,8 +58,13 @@ def check_clean(one: Round, *, bounded: bool) -> None:
 
 
 def check_mean(moments: Moments, expected: Array, alpha: float) -> None:
-    """z-tests of the mean of each group of rays."""
+    """z-tests of the mean of each group of rays.
+
+    They must be able to tell something: weights that explode would hide behind their own variance.
+    """
     deviation, square_error = moments.mean - expected, moments.variance / moments.count
+    noise = np.sqrt(square_error.sum()) / expected.sum()
+    assert noise < RESOLVED, f"mean: known to {noise:.2g} only"
     require(_p_of_groups(deviation, square_error, expected), alpha, "mean")
 
 
