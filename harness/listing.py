@@ -71,8 +71,8 @@ def kinds(models: dict[str, Any], word: str) -> list[Record]:
 def _field(name: str, field: Any) -> str:
     if field.is_required():
         return f"{name} (required): {field.description}"
-    given = "optional" if field.default is None else _plain(field.default)
-    return f"{name} = {given}: {field.description}"
+    given = "(optional)" if field.default is None else f"= {_plain(field.default)}"
+    return f"{name} {given}: {field.description}"
 
 
 def _plain(value: Any) -> str:

@@ -101,8 +101,8 @@ class Accuracy:
         off = abs(self.bias) - rounding * abs(self.reference)
         if self.variance == 0 and self.estimate != 0:
             return off > 0
-        missing = abs(self.bias) * self.samples / largest
-        return missing > RARE and off > SIX * self.bias_stderr
+        explained = abs(self.bias) * self.samples < RARE * largest
+        return not explained and off > SIX * self.bias_stderr
 
     def time_to(self, relative_error: float, time_per_sample: float) -> float | None:
         """Device seconds a ray until the relative RMSE falls to an error; inf if it never does.

@@ -145,7 +145,8 @@ def table_of(rows: list[Row]) -> Table:
     """A table of one group's rows; what reaches 1 % soonest is marked with a star."""
     first = rows[0]
     reference = next((short(number(row, "reference"), 4) for row in rows if row["reference"]), "?")
-    title = f"{first['estimand']} of {first['medium']}, {first['rays']} rays, reference {reference}"
+    rays = "1 ray" if first["rays"] == "1" else f"{first['rays']} rays"
+    title = f"{first['estimand']} of {first['medium']}, {rays}, reference {reference}"
     table = Table(title=escape(title), title_justify="left", title_style="bold", box=None)
     table.padding = (0, 1, 0, 0)
     table.add_column("tracker", overflow="fold")

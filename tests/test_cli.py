@@ -205,6 +205,13 @@ def test_lists(call, what):
         assert next(iter(record.values())) in out
 
 
+def test_what_is_told_of_a_medium(call):
+    out = call("list", "media")[1]
+    assert "sigma_t (required): Mean extinction." in out
+    assert "size = [1, 1, 1]: Sides of the box." in out
+    assert "center (optional): Centre of the blob" in out
+
+
 def test_trackers_are_what_is_listed_if_nothing_is_said(call):
     assert call("list") == call("list", "trackers")
 

@@ -199,6 +199,12 @@ def test_scores_too_rare_to_be_seen_contradict_nothing():
     assert not result(reference=1e-4, bias=-1e-4, **nothing).contradicted(1e3, 1e-3)
 
 
+def test_where_all_scores_must_be_0():
+    nothing = {"estimate": 0.0, "reference": 0.0, "variance": 0.0, "bias_stderr": 0.0}
+    assert not result(**nothing).contradicted(0.0, 1e-3)
+    assert result(**nothing | {"estimate": 0.1, "bias": 0.1}).contradicted(0.0, 1e-3)
+
+
 def test_skewed_scores_of_a_thick_medium_are_not_condemned():
     """Ratio tracking through a depth of 30: weights 1/2^k, whose spread few samples show."""
     random = np.random.default_rng(11)
