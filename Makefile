@@ -10,7 +10,7 @@ sweep: $(VENV)/installed
 	$(BIN)/freepath run quick
 
 test: $(VENV)/installed-for-tests
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n auto --dist loadfile
 
 lint: $(VENV)/installed-for-tests
 	$(BIN)/ruff check harness tests
