@@ -80,13 +80,16 @@ static real cell_depth(const Cell cell, const real s)
     return s * (cell.c0 + s * ((SCALAR)0.5 * cell.c1 + s * (third * cell.c2 + s * ((SCALAR)0.25 * cell.c3))));
 }
 
+/* Lanes whose depth is beyond the cell find its end at once, and do not keep the others waiting. */
 static real cell_distance(const Cell cell, const real depth, const real length)
 {
-    Bracket bracket = {(real)0, length, length * depth / cell_depth(cell, length)};
+    const real total = cell_depth(cell, length);
+    const real wanted = smaller(depth, total);
+    Bracket bracket = {(real)0, length, length * wanted / total, (real)FAR};
     for (int i = 0; i < NEWTON_STEPS; ++i) {
         const real s = bracket.at;
         const real sigma = cell.c0 + s * (cell.c1 + s * (cell.c2 + s * cell.c3));
-        if (!any_lane(newton(&bracket, cell_depth(cell, s) - depth, sigma)))
+        if (!any_lane(newton(&bracket, cell_depth(cell, s) - wanted, sigma)))
             break;
     }
     return bracket.at;

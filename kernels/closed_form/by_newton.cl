@@ -7,7 +7,7 @@ static real optical_depth(const Path *path, const Scene *scene, const real t);
 static real distance_to(const Path *path, const Scene *scene, const real depth)
 {
     const real share = depth / optical_depth(path, scene, path->length);
-    Bracket bracket = {(real)0, path->length, path->length * saturate(share)};
+    Bracket bracket = {(real)0, path->length, path->length * saturate(share), (real)FAR};
     for (int i = 0; i < NEWTON_STEPS; ++i) {
         const real t = bracket.at;
         const real sigma = sigma_t_at(scene, path->origin_x + t * path->direction_x,

@@ -1,3 +1,5 @@
+import os
+
 import pytest
 from freepath import catalog, device
 from freepath.errors import DeviceError
@@ -6,7 +8,10 @@ from support.rig import Rig
 
 @pytest.fixture(scope="session")
 def device_under_test():
-    """The PoCL that comes with pip where it is installed, else the first device."""
+    """$FREEPATH_TEST_DEVICE, else the PoCL that comes with pip, else the first device."""
+    chosen = os.environ.get("FREEPATH_TEST_DEVICE")
+    if chosen:
+        return device.open_devices([chosen])[0]
     try:
         return device.open_devices(["3.0"])[0]
     except DeviceError:

@@ -28,7 +28,7 @@ def test_thick(rig, tracker, majorant):
     """An optical depth of 1000: a transmittance of 0, which is not 0 / 0."""
     samples = homogeneous(rig, tracker, 1e3, majorant, rays=UPWARD).record(8)
     check_clean(samples.round, bounded=True)
-    assert (samples.scores("transmittance") == 0.0).all()
+    assert (samples.score == 0.0).all()
     assert samples.round.estimate == samples.round.variance == 0.0
 
 
@@ -69,7 +69,7 @@ def test_contrast(rig, tracker, interpolation):
     expected = flight.reference()
     thick = expected < 1e-30
     assert np.count_nonzero(thick) == 1
-    assert (samples.scores("transmittance")[thick] == 0.0).all()
+    assert (samples.score[thick] == 0.0).all()
     if tracker == "regular":
         check_samples(flight, samples, 1e-4)
     else:

@@ -21,7 +21,7 @@ def flight(rig, tracker="delta", lanes=16, **options):
 
 def check_same(one, other, rounding, estimand):
     lookups = one.lookups, other.lookups
-    check_same_samples(one.scores(estimand), other.scores(estimand), lookups, rounding)
+    check_same_samples(one.score, other.score, lookups, rounding)
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +59,7 @@ def test_blocks_and_launches(rig, one_lane, blocks, launches):
     assert totals[0]["lookups"] == pytest.approx(totals[1]["lookups"], rel=1e-5)
     assert totals[0]["steps"] == pytest.approx(totals[1]["steps"], rel=1e-5)
     # moments of blocks, merged, are those of the samples
-    scores = found.scores("free_path")
+    scores = found.score
     np.testing.assert_allclose(found.round.moments.mean, scores.mean(axis=1), rtol=1e-6)
     np.testing.assert_allclose(
         found.round.moments.variance, scores.var(axis=1, ddof=1), rtol=1e-4, atol=1e-12

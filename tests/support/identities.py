@@ -185,6 +185,32 @@ def check_free_path(
     require(np.array(p_values), alpha, "free path (chi-square, KS)")
 
 
+def check_weighted_free_path(
+    depth_at: Array, weight: Array, escaped: NDArray[np.bool_], depth: Array, alpha: float
+) -> None:
+    """z-tests of the weight that ends in each of equally probable bins of F, and of what escapes.
+
+    For trackers whose flights have another distribution than free paths, and weights that make up
+    for it. In empty space such weights may cancel without end; most bins must say something.
+    """
+    bins = 16
+    rays = depth > 0.0
+    depth_at, weight, escaped = depth_at[rays], weight[rays], escaped[rays]
+    share = np.expm1(-depth_at) / np.expm1(-depth[rays])[:, None]
+    place = np.where(escaped, bins, np.clip(bins * share, 0, bins - 1).astype(int))
+    escape = np.exp(-depth[rays])
+    p_values, noise = [], []
+    for number in range(bins + 1):
+        weights = np.where(place == number, weight, 0.0)
+        expected = escape if number == bins else (1.0 - escape) / bins
+        deviation = (weights.mean(axis=1) - expected).sum()
+        error = np.sqrt((weights.var(axis=1, ddof=1) / weights.shape[1]).sum())
+        noise.append(error / expected.sum())
+        p_values.append(2.0 * stats.norm.sf(abs(deviation) / error))
+    assert np.median(noise) < 5.0 * RESOLVED, f"free path: bins known to {np.median(noise):.2g}"
+    require(np.array(p_values), alpha, "free path (weighted)")
+
+
 def check_same_samples(one: Array, other: Array, lookups: tuple[Array, Array], rounding: float):
     """The same paths: equal lookups but for fewer than 1 in 1e5, and equal scores up to rounding.
 

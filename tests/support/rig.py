@@ -46,13 +46,8 @@ class Samples:
     escaped: np.ndarray
     lookups: np.ndarray
     score: np.ndarray
+    """What each contributes to the mean."""
     round: Round
-
-    def scores(self, estimand: str) -> np.ndarray:
-        """What each sample contributes to the mean."""
-        if estimand == "transmittance":
-            return np.where(self.escaped, self.weight, 0.0)
-        return self.weight * self.t if estimand == "free_path" else self.weight
 
 
 @dataclass(frozen=True)
