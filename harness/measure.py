@@ -18,6 +18,8 @@ ROUND_S = 0.2
 """Device time aimed at for a round; a budget of few seconds gets shorter ones."""
 COUNTING_S = 0.05
 """Device time that counting should take at least."""
+EXACTLY_COUNTED = 64
+"""Samples of each ray that are counted where the number of samples is given."""
 ENOUGH_S = 0.01
 """Device time from which on a run tells what a sample costs."""
 MOST_SAMPLES = 1 << 30
@@ -129,7 +131,14 @@ class Bench:
         limited = self.rule.samples is not None
         self._shapes = exactly(self.rule.samples, shape) if limited else itertools.repeat(shape)
         self._next = next(self._shapes)
-        self.measurement.counted = self._run_for(self.counting, COUNTING_S)
+        self.measurement.counted = self._counted()
+
+    def _counted(self) -> Round:
+        """Count for a while, or so many samples that exact runs can be compared count by count."""
+        if self.rule.samples is None:
+            return self._run_for(self.counting, COUNTING_S)
+        self._first_run(self.counting)
+        return self._run(self.counting, 0, Shape(1, min(self.rule.samples, EXACTLY_COUNTED)))
 
     def _calibrated(self) -> Shape:
         rays, one = self.timed.rays, self._run_for(self.timed, ENOUGH_S)

@@ -142,6 +142,14 @@ def test_preparing_a_dear_case_takes_one_sample_of_each_ray():
     assert bench.measurement.counted.samples == 10**6
 
 
+def test_an_exact_number_of_samples_is_counted_exactly():
+    """However fast the machine is, so that two runs can be compared count by count."""
+    for seconds in (1e-8, 1e-6):
+        bench = bench_of(MadeUp(10, seconds), samples=1000)
+        assert bench.measurement.counted.samples == 10 * measure.EXACTLY_COUNTED
+    assert bench_of(MadeUp(10), samples=7).measurement.counted.samples == 70
+
+
 def test_a_cheap_case_is_counted_for_a_while():
     bench = bench_of(MadeUp())
     counted = bench.measurement.counted
