@@ -36,7 +36,10 @@ static mask next_residual(Path *path, const Scene *scene, Rng *rng, mask *contro
         walking = crossing;
         if (!any_lane(walking))
             return here;
-        draw = choose(crossing, draw - path->majorant * span, draw);
+        /* Never below 0, as rounding may have it: such a draw would collide with a majorant of 0. */
+        const real passed = path->majorant * span;
+        const real left = draw - passed;
+        draw = choose(crossing, larger(left, (real)0), draw);
         enter_next_cell(path, scene, plane, crossing);
         enter_controlled_cell(path, scene, crossing);
     }

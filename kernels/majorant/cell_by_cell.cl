@@ -3,8 +3,8 @@ title: Tentative collisions cell by cell
 uses: [walk/cell_by_cell]
 ---*/
 /* Every live lane goes on to its next tentative collision or leaves; returns those now at one. path->depth
-   is the majorant's optical depth flown. Lanes that
-   are there wait for the others: in thin media that was 1.4 times as fast as one cell a step. */
+   is the majorant's optical depth flown. Lanes that are there wait for the others: in thin media that was
+   1.4 times as fast as one cell a step. */
 static mask next_tentative(Path *path, const Scene *scene, Rng *rng)
 {
     const real whole_draw = exponential(rng);
@@ -23,9 +23,12 @@ static mask next_tentative(Path *path, const Scene *scene, Rng *rng)
         walking = crossing;
         if (!any_lane(walking))
             break;
-        draw = choose(crossing, draw - depth, draw);
+        /* Never below 0, as rounding may have it: such a draw would collide with a majorant of 0. */
+        const real left = draw - depth;
+        draw = choose(crossing, larger(left, (real)0), draw);
         enter_next_cell(path, scene, plane, crossing);
-    }    path->depth = choose(here, path->depth + whole_draw, path->depth);
+    }
+    path->depth = choose(here, path->depth + whole_draw, path->depth);
     return here;
 }
 

@@ -131,7 +131,7 @@ DEFECTS = {
         DELTA,
     ),
     "a distance that starts anew in each cell": Defect(
-        whole, "mean", Change("draw = choose(crossing, draw - depth, draw);", ""), DELTA
+        whole, "mean", Change("draw = choose(crossing, larger(left, (real)0), draw);", ""), DELTA
     ),
     "the majorant of the cell beside": Defect(
         cleanness,
