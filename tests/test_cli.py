@@ -10,7 +10,7 @@ import time
 import pytest
 from freepath import cli
 from freepath import device as devices
-from freepath.arguments import LISTS
+from freepath.commands.listing import LISTS
 from freepath.results import read_rows
 
 SWEEP = """\

@@ -25,6 +25,7 @@ ORDER = (
     ("rows", "table"),
     ("sweep", "report"),
     ("run", "arguments"),
+    ("commands",),
     ("cli",),
     ("__main__",),
 )

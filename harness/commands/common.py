@@ -1,0 +1,47 @@
+"""What several commands do: find the cases of a config, print records and tables."""
+
+from __future__ import annotations
+
+import json
+from argparse import Namespace
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from freepath.catalog import Catalog
+    from freepath.config import Config
+    from freepath.plan import Case
+    from rich.console import Console
+
+
+def cases_of(options: Namespace) -> tuple[Config, Catalog, list[Case]]:
+    """The config, the trackers and the cases that the filters leave."""
+    from freepath import catalog, config, plan
+
+    known = catalog.load(options.trackers)
+    path = config.find(options.config)
+    loaded = config.load(path, known.parameter_models(), options.axis)
+    cases = plan.select(plan.expand(loaded, known), options.include, options.exclude)
+    return loaded, known, cases
+
+
+def print_records(records: list[dict[str, Any]], *, as_json: bool) -> int:
+    """As a table, or as JSON; returns the exit code."""
+    from freepath import listing
+
+    if as_json:
+        print(json.dumps(records, indent=1))
+    else:
+        console_of().print(listing.table_of(records))
+    return 0
+
+
+def console_of(*, stderr: bool = False) -> Console:
+    """A console; one that is no terminal has no width that a table should be folded to."""
+    from rich.console import Console
+
+    class Plain(Console):
+        def on_broken_pipe(self) -> None:
+            raise BrokenPipeError  # which main knows; rich would exit with 1
+
+    console = Plain(stderr=stderr)
+    return console if console.is_terminal else Plain(stderr=stderr, width=160)

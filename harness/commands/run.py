@@ -1,0 +1,176 @@
+"""`freepath run`: a sweep, its progress, its table and its result files."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from argparse import Namespace
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import shtab
+from freepath.arguments import add_config, add_device
+from freepath.commands.common import cases_of, console_of
+from freepath.errors import FAILED, INTERRUPTED
+
+if TYPE_CHECKING:
+    from freepath.plan import Case
+    from freepath.run import Run
+    from rich.console import Console
+
+
+def add(commands: Any) -> None:
+    """Declare its arguments."""
+    run = commands.add_parser(
+        "run",
+        help="run a sweep",
+        description="Run the cases of a config, print a table and write summary.csv, samples.csv "
+        "and run.json.",
+        allow_abbrev=False,
+    )
+    add_config(run)
+    add_device(run, "part of the name, platform or driver of a device, or 'all'; may be repeated")
+    run.add_argument("-N", "--show-only", action="store_true", help="list the cases and stop")
+    run.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        metavar="DIR",
+        help="folder for the results (default: results/NAME-TIME)",
+    ).complete = shtab.DIRECTORY
+    run.add_argument(
+        "--resume",
+        action="store_true",
+        help="go on with the run in DIR (default: the newest of this config): rows whose config, "
+        "source, device and driver are unchanged are kept",
+    )
+    run.add_argument("--json", action="store_true", help="print the rows as JSON, nothing else")
+
+
+def execute(options: Namespace) -> int:
+    """Run it; returns the exit code."""
+    started = time.perf_counter()
+    loaded, known, cases = cases_of(options)
+    if options.show_only:
+        return _show_only(options, cases)
+    from freepath import environment, run
+    from freepath.device import open_devices
+    from freepath.results import ResultFolder, records
+
+    load = environment.load()
+    devices = open_devices(options.device)
+    path = options.output or (run.newest_folder if options.resume else run.new_folder)(loaded.name)
+    folder, clock = ResultFolder(path, resume=options.resume), run.Clock(started)
+    console = console_of(stderr=options.json)
+    with _shown_progress(console) as (on_done, on_progress):
+        sweep = run.Run(loaded, known, cases, folder, clock, on_done, on_progress)
+        try:
+            sweep.execute(devices)
+        except KeyboardInterrupt:
+            _say_how_to_resume(sweep)
+            return INTERRUPTED
+    rows = _in_order(folder.rows(), cases)
+    if options.json:
+        print(json.dumps(records(rows), indent=1))
+    else:
+        _print_tables(console, rows, load)
+        _print_times(console, sweep)
+        for written in folder.paths():
+            console.print(f"wrote {written}", highlight=False, markup=False, soft_wrap=True)
+    return _say_failures(rows)
+
+
+@contextmanager
+def _shown_progress(console: Console) -> Iterator[tuple[Any, Any]]:
+    """A bar on a terminal, a line a case elsewhere; gives what Run tells rows and progress to."""
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import TimeRemainingColumn as Remaining
+
+    columns = (
+        TextColumn("{task.completed:.0f}/{task.total:.0f} cases"),
+        BarColumn(),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        Remaining(elapsed_when_finished=False),
+        TextColumn("{task.description}"),
+    )
+    with Progress(
+        *columns, console=console, transient=True, disable=not console.is_terminal
+    ) as bar:
+        task = bar.add_task("", total=0)
+
+        def on_done(row: dict[str, Any]) -> None:
+            if not console.is_terminal:
+                line = f"{row['status']:>8}  {row['case']}"
+                console.print(line, highlight=False, markup=False, soft_wrap=True)
+
+        def on_progress(done: float, total: int, what: str) -> None:
+            bar.update(task, completed=done, total=total, description=what)
+
+        yield on_done, on_progress
+
+
+def _say_how_to_resume(sweep: Run) -> None:
+    done = f"interrupted with {sweep.ended} of {sweep.total} cases done"
+    path = sweep.folder.folder
+    if sweep.folder.is_open:
+        done += f"; go on with the same command and -o {path} --resume"
+    print(f"freepath: {done}", file=sys.stderr)
+
+
+def _in_order(rows: list[dict[str, str]], cases: list[Case]) -> list[dict[str, str]]:
+    """Rows in the order of the cases; further ones that a resumed folder may hold come last."""
+    order = {case.case_id: case.index for case in cases}
+    last = max(order.values()) + 1
+    return sorted(rows, key=lambda row: order.get(row["case_id"], last))
+
+
+def _say_failures(rows: list[dict[str, str]]) -> int:
+    from freepath import table
+
+    failed = table.failures(rows)
+    for row in failed:
+        print(f"freepath: {row['status']}: {row['case']}: {row['reason']}", file=sys.stderr)
+    return FAILED if failed else 0
+
+
+def _print_tables(console: Console, rows: list[dict[str, str]], load: float) -> None:
+    from freepath import environment, table
+
+    for device, members in table.by_device(rows).items():
+        console.print(f"{device}\n{environment.processor()}, load {load:.2f}", markup=False)
+        for group in table.groups(members):
+            console.print("", table.table_of(group))
+    for reason, count in table.skipped(rows).items():
+        noun = "case" if count == 1 else "cases"
+        console.print(f"skipped {count} {noun}: {reason}", highlight=False, markup=False)
+    console.print(f"\n{table.LEGEND}\n", highlight=False)
+
+
+def _print_times(console: Console, sweep: Run) -> None:
+    if not sweep.total:
+        console.print("nothing was left to run")
+        return
+    clock, times = sweep.clock, sweep.clock.as_dict()
+    console.print(
+        f"device time {100 * times['device_time_share']:.0f} % of {clock.outside_s:.1f} s outside "
+        f"compilation; compilation {clock.build_s:.1f} s",
+        highlight=False,
+    )
+
+
+def _show_only(options: Namespace, cases: list[Case]) -> int:
+    if options.json:
+        named = [
+            case.identity() | {"name": case.name, "skipped": case.skip_reason} for case in cases
+        ]
+        print(json.dumps(named, indent=1))
+        return 0
+    for case in cases:
+        reason = f"  (skipped: {case.skip_reason})" if case.skip_reason else ""
+        print(f"{case.index:>5}  {case.name}{reason}")
+    print(f"\n{len(cases)} cases")
+    return 0
