@@ -25,6 +25,7 @@ from freepath.kernel_files import split_front_matter
 from pydantic import ValidationInfo, create_model, field_validator
 
 NEEDS = ("majorant", "control", "closed_form", "cells")
+ANY = "any"
 STATE = r"(real|mask|index)(\[[1-9][0-9]?\])?"
 """What a tracker may keep of a path: types that main.cl can merge under a mask, and arrays of them
 as scratch, which a sample fills before it reads them."""
@@ -100,13 +101,25 @@ class Bounding(Flag):
         return "true, false or {parameter: [choices]}"
 
 
+class Channels(Rule):
+    """How many channels a path follows: a number, or `any` for those that the medium has."""
+
+    def check(self, value: Any, context: Any) -> int | str:
+        """Return the number, or `any`."""
+        return value if value == ANY else Number("count", minimum=1).check(value, context)
+
+    def describe(self) -> str:
+        """Return what may be written."""
+        return "any or an integer >= 1"
+
+
 class FrontMatter(Model):
     """The YAML in the first comment of a tracker's file."""
 
     title: Annotated[str, Text()]
     estimands: Annotated[tuple[Annotated[str, Choice(ESTIMANDS)], ...], OneOrMore()]
     needs: Annotated[tuple[Annotated[str, Choice(NEEDS)], ...], OneOrMore(optional=True)] = ()
-    channels: Annotated[int, Number("count", minimum=1)] = 1
+    channels: Annotated[int | str, Channels()] = 1
     majorants: Annotated[tuple[Annotated[str, Choice(tuple(MAJORANTS))], ...], OneOrMore()] = tuple(
         MAJORANTS
     )
@@ -142,7 +155,8 @@ class Tracker:
     title: str
     estimands: tuple[str, ...]
     needs: frozenset[str]
-    channels: int
+    channels: int | str
+    """How many it follows; ANY for as many as the medium has, each with a weight of its own."""
     majorants: tuple[str, ...]
     bounding: bool | dict[str, tuple[Any, ...]]
     """Whether it is only right where the majorant bounds; or for which choices of a parameter."""

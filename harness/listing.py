@@ -21,6 +21,7 @@ Record = dict[str, Any]
 EFFECTS = {
     "absorption": "every medium takes light out of the ray",
     "heterogeneous": "the extinction varies: a lookup at each tentative collision",
+    "chromatic": "a weight for each channel: one lookup and one path serve all",
     "majorant_grid": "a majorant for each cell: a walk by DDA between tentative collisions",
 }
 

@@ -12,7 +12,7 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import Any
 
-from freepath.catalog import Catalog, Tracker
+from freepath.catalog import ANY, Catalog, Tracker
 from freepath.config.base import Kind
 from freepath.config.sweep import AXES, Config, Exclude, Include, Stop
 from freepath.errors import ConfigError, NothingMatchedError, Problem
@@ -178,10 +178,18 @@ def _skip_reason(tracker: Tracker, point: Point) -> str:
     majorant = point["majorant"]
     if majorant and majorant.kind not in tracker.majorants:
         reasons.append(f"{tracker.name} does not work with a majorant {majorant.kind}")
+    channels = point["medium"].channel_count
+    if tracker.channels not in (ANY, channels):
+        follows = f"{tracker.name} follows {_counted(tracker.channels)}"
+        reasons.append(f"{follows}, and the medium has {channels}")
     for need in sorted(tracker.needs - {"majorant", "control"} - point["medium"].OFFERS):
         what = need.replace("_", " ")
         reasons.append(f"{tracker.name} needs {what}, which {point['medium'].kind} does not offer")
     return "; ".join(reasons)
+
+
+def _counted(channels: int | str) -> str:
+    return "one channel" if channels == 1 else f"{channels} channels"
 
 
 def _name(point: Point) -> str:
@@ -199,7 +207,8 @@ def label(kind: Kind) -> str:
     For instance "cloud-128-200" or "cloud-128-200-seed=2"; sigma_t needs no name either.
     """
     parts = [kind.kind]
-    for name, field in type(kind).model_fields.items():
+    fields = type(kind).model_fields.items()
+    for name, field in sorted(fields, key=lambda item: not item[1].is_required()):
         value = getattr(kind, name)
         if field.is_required():
             parts.append(_short(value))

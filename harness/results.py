@@ -19,8 +19,8 @@ LOCK = ".lock"
 COLUMNS = (
     "schema_version", "run_id", "case_id", "case", "status", "reason",
     "device", "platform", "driver_version",
-    "tracker", "estimand", "medium", "majorant", "tightness", "effects", "arithmetic", "lanes",
-    "params", "seed", "rays", "samples_per_ray", "rounds", "stopped",
+    "tracker", "estimand", "medium", "channels", "majorant", "tightness", "effects",
+    "arithmetic", "lanes", "params", "seed", "rays", "samples_per_ray", "rounds", "stopped",
     "lookups_per_sample", "crossings_per_sample", "steps_per_sample", "lane_occupancy",
     "time_per_sample_s", "time_per_sample_cv", "time_noise", "timing_source",
     "time_device_s", "time_wall_s", "device_time_share", "time_build_s", "lookups_per_s",

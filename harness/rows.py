@@ -35,6 +35,7 @@ def base_row(case: Case, device: DeviceInfo, run_id: str) -> dict[str, Any]:
         "tracker": case.tracker,
         "estimand": case.estimand,
         "medium": label(case.medium),
+        "channels": case.medium.channel_count,
         "majorant": label(case.majorant) if case.majorant else "none",
         "tightness": case.tightness,
         "arithmetic": case.arithmetic,
@@ -52,6 +53,8 @@ def effects_of(case: Case, medium_kernel: str) -> str:
         effects.append("heterogeneous")
     if case.majorant and case.majorant.kind == "grid":
         effects.append("majorant_grid")
+    if case.medium.channel_count > 1:
+        effects.append("chromatic")
     return "+".join(effects)
 
 
@@ -64,7 +67,8 @@ def measured_row(
 ) -> dict[str, Any]:
     """Fill in what was measured. A row whose numbers cannot be trusted says so in its status.
 
-    `reference` is of the shape (rays,); `largest_score` bounds the scores of unbiased trackers.
+    `reference` is of the shape (rays,) or (rays, channels); `largest_score` bounds the scores of
+    unbiased trackers.
     """
     with np.errstate(invalid="ignore", over="ignore"):
         result = accuracy(found.moments, reference)

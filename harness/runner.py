@@ -72,7 +72,8 @@ class Round:
     moments: Moments | None
     """Per ray; let go of once it is merged with those of other rounds."""
     recorded: np.ndarray | None = None
-    """(units, samples, 5): t, weight, escaped, lookups so far in the unit, score."""
+    """(units, samples, 3 + 2 channels): t, weight, escaped, lookups so far in the unit, score; then
+    weight and score of each further channel."""
 
     @property
     def time_s(self) -> float:
@@ -116,6 +117,7 @@ class Runner:
     arithmetic: str
     lanes: int
     seed: int
+    channels: int = 1
     _pace: Pace = field(init=False, repr=False)
 
     def __post_init__(self):
@@ -133,6 +135,15 @@ class Runner:
     @property
     def _scalar(self) -> np.dtype:
         return scalar_type(self.arithmetic)
+
+    @property
+    def _tallied(self) -> int:
+        """Scores of a sample that are tallied: of several channels their mean too."""
+        return 1 if self.channels == 1 else self.channels + 1
+
+    @property
+    def _recorded(self) -> int:
+        return 3 + 2 * self.channels
 
     @property
     def lanes_in_all(self) -> int:
@@ -169,7 +180,9 @@ class Runner:
         counters = self._read("counters", outputs, (units, len(COUNTERS)), np.uint32)
         recorded = None
         if record:
-            recorded = self._read("recorded", outputs, (units, samples, 5), self._scalar)
+            recorded = self._read(
+                "recorded", outputs, (units, samples, self._recorded), self._scalar
+            )
         return Round(
             samples=units * samples,
             estimate=float(moments.mean.mean()),
@@ -217,18 +230,20 @@ class Runner:
         scalar = self._scalar.itemsize
         sizes = {
             "taken": 4,
-            "moments": units * 3 * scalar,
+            "moments": units * 3 * self._tallied * scalar,
             "counters": units * 4 * len(COUNTERS),
             "iterations": work_items * 8,
-            "recorded": max(units * recorded * 5 * scalar, 8),
+            "recorded": max(units * recorded * self._recorded * scalar, 8),
         }
         return {name: self.data.output(name, size) for name, size in sizes.items()}
 
     def _moments(self, outputs: Outputs, blocks: int, samples: int) -> Moments:
         """The moments of each ray; a unit's mean comes in two parts, mean less excess."""
-        parts = self._read("moments", outputs, (blocks, self.rays, 3), self._scalar)
+        shape = (blocks, self.rays, self._tallied, 3)
+        parts = self._read("moments", outputs, shape, self._scalar)
         mean, excess, m2 = np.moveaxis(parts.astype(np.float64), -1, 0)
-        return merge_blocks(mean - excess, m2, samples)
+        moments = merge_blocks(mean - excess, m2, samples)
+        return moments.flat if self.channels == 1 else moments.of_channels
 
     def _read(
         self, name: str, outputs: Outputs, shape: tuple, dtype: np.dtype | type

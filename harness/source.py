@@ -37,6 +37,9 @@ class Structure:
     majorant_numbers: tuple[str, ...]
     lanes: int
     arithmetic: str
+    channels: int = 1
+    chromatic: bool = False
+    """Whether a path has a weight for each channel, be it one; or one weight."""
     tracker_state: tuple[tuple[str, str], ...] = ()
     logarithm: str = "polynomial"
     count: bool = False
@@ -73,11 +76,12 @@ def compose(structure: Structure) -> Source:
     parts = [_defines(structure)]
     parts += _named(kernel_files.read(name) for name in _before_structs(structure))
     walks = _with_uses(_walks(structure))
-    parts.append(_structs(structure, walks))
+    channels = kernel_files.read(f"channels/{'several' if structure.chromatic else 'one'}")
+    parts.append(_structs(structure, [*walks, channels]))
     middle = [f"estimands/{structure.estimand}", "count/on" if structure.count else "count/off"]
     middle += [f"medium/{structure.medium}", "lanes/path"]
     parts += _named(kernel_files.read(name) for name in middle)
-    parts += _named(walks)
+    parts += _named([channels, *walks])
     parts += _named([KernelFile(f"trackers/{structure.tracker}.cl", structure.tracker_code)])
     record = "record/samples" if structure.record else "record/nothing"
     parts += _named(kernel_files.read(name) for name in ("lanes/tally", record, "main"))
@@ -131,6 +135,7 @@ def _defines(structure: Structure) -> str:
     double = scalar == "double"
     lines = [
         f"#define LANES {structure.lanes}",
+        f"#define CHANNELS {structure.channels}",
         f"#define SCALAR {scalar}",
         f"#define INTEGER {'long' if double else 'int'}",
         f"#define ROUNDING {'2.220446049250313e-16' if double else '1.1920929e-7f'}",
@@ -150,6 +155,7 @@ def _structs(structure: Structure, walks: list[KernelFile]) -> str:
         "box": BOX,
         "medium": structure.medium_numbers,
         "majorant": structure.majorant_numbers if "majorant" in structure.needs else (),
+        "channels": ("extinction[CHANNELS]", "largest") if structure.chromatic else (),
         "tracker": structure.tracker_numbers,
     }
     groups = {group: names for group, names in groups.items() if names}
@@ -183,16 +189,23 @@ def _state(structure: Structure, walks: list[KernelFile]) -> list[str]:
         raise CatalogError(f"trackers/{structure.tracker}.cl: {message}")
     state |= dict(structure.tracker_state)
     lines = ["typedef struct {"]
-    for name, kind in (state or {"unused": "index"}).items():
-        scalar, bracket, count = kind.partition("[")
+    for name, kind in state.items():
+        scalar, bracket, count = kind.replace("spectrum", "real[CHANNELS]").partition("[")
         lines.append(f"    {scalar} {name}{bracket}{count};")
     lines += [
         "} State;",
         "static void merge_state(State *into, const State *from, const mask where)",
     ]
     # arrays are scratch that a sample fills as it goes: there is nothing to take over at its start
-    merged = [name for name, kind in state.items() if "[" not in kind]
+    merged = [name for name, kind in state.items() if "[" not in kind and kind != "spectrum"]
     merges = [f"    into->{name} = choose(where, from->{name}, into->{name});" for name in merged]
+    spectra = [name for name, kind in state.items() if kind == "spectrum"]
+    if spectra:
+        merges.append("    for (int c = 0; c < CHANNELS; ++c) {")
+        merges += [
+            f"        into->{n}[c] = choose(where, from->{n}[c], into->{n}[c]);" for n in spectra
+        ]
+        merges.append("    }")
     return [*lines, "{", *merges, "}"]
 
 
@@ -201,10 +214,13 @@ def numbers_of(
     box: list[float],
     medium: dict[str, float],
     majorant: dict[str, float],
+    channels: list[float],
     tracker: dict[str, float],
 ) -> list[float]:
     """The values of the kernel's Numbers, in the order in which compose declares them."""
     values = [*box, *(medium[name] for name in structure.medium_numbers)]
     if "majorant" in structure.needs:
         values += [majorant[name] for name in structure.majorant_numbers]
+    if structure.chromatic:
+        values += [*channels, max(channels)]
     return values + [tracker[name] for name in structure.tracker_numbers]

@@ -20,28 +20,53 @@ RARE = 20.0
 
 @dataclass(frozen=True)
 class Moments:
-    """Count, mean and sum of squared deviations of the scores of each ray, float64 (rays,)."""
+    """Count, mean and sum of squared deviations of the scores of each ray, float64.
+
+    Of the shape (rays,), or (rays, channels) where there are several. Those of a path are
+    correlated; `joint_m2` (rays,) is the sum of squared deviations of the mean over channels.
+    """
 
     count: int
     mean: np.ndarray
     m2: np.ndarray
+    joint_m2: np.ndarray | None = None
+
+    @property
+    def flat(self) -> Moments:
+        """Without the axis of channels, of one."""
+        return Moments(self.count, self.mean[:, 0], self.m2[:, 0])
+
+    @property
+    def of_channels(self) -> Moments:
+        """Of channels, from those of channels and of the mean over them, which comes last."""
+        return Moments(self.count, self.mean[:, :-1], self.m2[:, :-1], self.m2[:, -1])
+
+    @property
+    def joint_variance(self) -> np.ndarray:
+        """Unbiased variance of the mean over channels of one sample, per ray (rays,)."""
+        joint = self.m2 if self.joint_m2 is None else self.joint_m2
+        return joint / (self.count - 1)
 
     def merged(self, other: Moments) -> Moments:
         """Both together (Chan, Golub, LeVeque 1983, eq. 2.1)."""
         count = self.count + other.count
         difference = other.mean - self.mean
         mean = self.mean + difference * (other.count / count)
-        m2 = self.m2 + other.m2 + difference**2 * (self.count * other.count / count)
-        return Moments(count, mean, m2)
+        share = self.count * other.count / count
+        m2 = self.m2 + other.m2 + difference**2 * share
+        if self.joint_m2 is None:
+            return Moments(count, mean, m2)
+        joint = self.joint_m2 + other.joint_m2 + difference.mean(axis=1) ** 2 * share
+        return Moments(count, mean, m2, joint)
 
     @property
     def variance(self) -> np.ndarray:
-        """Unbiased variance of one sample, per ray (rays,); needs a count of two."""
+        """Unbiased variance of one sample, shaped as the mean; needs a count of two."""
         return self.m2 / (self.count - 1)
 
 
 def merge_blocks(mean: np.ndarray, m2: np.ndarray, samples: int) -> Moments:
-    """Merge blocks of equally many samples; mean and m2 have the shape (blocks, rays)."""
+    """Merge blocks of equally many samples; mean and m2 have the shape (blocks, rays, ...)."""
     mean, m2 = mean.astype(np.float64), m2.astype(np.float64)
     # from the first block on, or rounding would give blocks that are all alike a variance
     merged = mean[0] + (mean - mean[0]).mean(0)
@@ -119,7 +144,10 @@ class Accuracy:
 
 
 def accuracy(moments: Moments, reference: np.ndarray) -> Accuracy:
-    """Compare the merged moments of all rounds with the float64 reference of each ray (rays,)."""
+    """Compare the merged moments of all rounds with the float64 reference, shaped as the mean.
+
+    Of several channels all is averaged over them too; that they are correlated is in `bias_stderr`.
+    """
     rays = len(moments.mean)
     error_of_mean = moments.variance / moments.count
     deviation = moments.mean - reference
@@ -127,7 +155,7 @@ def accuracy(moments: Moments, reference: np.ndarray) -> Accuracy:
         estimate=float(moments.mean.mean()),
         reference=float(reference.mean()),
         bias=float(deviation.mean()),
-        bias_stderr=math.sqrt(float(error_of_mean.sum())) / rays,
+        bias_stderr=math.sqrt(float((moments.joint_variance / moments.count).sum())) / rays,
         bias_rms=_significant_bias(deviation, error_of_mean),
         variance=float(moments.variance.mean()),
         samples=rays * moments.count,
@@ -138,8 +166,10 @@ def _significant_bias(deviation: np.ndarray, error_of_mean: np.ndarray) -> float
     """Root mean square over rays of the bias, its noise taken out; 0 where noise explains it.
 
     E[deviation^2] = bias^2 + error_of_mean. Of an unbiased estimator the difference has a standard
-    deviation of about sqrt(2 sum error_of_mean^2) / rays.
+    deviation of about sqrt(2 sum error_of_mean^2) / rays; of several channels it is at most that
+    of channels that are all the same.
     """
     excess = float((deviation**2 - error_of_mean).mean())
-    noise = math.sqrt(2 * float((error_of_mean**2).sum())) / len(deviation)
+    alike = deviation.size / len(deviation)
+    noise = math.sqrt(2 * alike * float((error_of_mean**2).sum())) / deviation.size
     return math.sqrt(excess) if excess > SIGNIFICANT * noise else 0.0

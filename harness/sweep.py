@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 from freepath import majorants, source
-from freepath.catalog import Catalog
+from freepath.catalog import ANY, Catalog
 from freepath.device import Device, Program, scalar_type
 from freepath.errors import BuildError, FreepathError, RunError
 from freepath.majorants import Majorant
@@ -69,15 +69,18 @@ class Scene:
         if case.majorant is None:
             return Majorant({})
         bounds = self.bounds(majorants.cells_of(case.majorant))
+        strongest = float(self.medium.channels.max())
+        if strongest != 1.0:
+            bounds = tuple(bound * strongest for bound in bounds)
         control = case.params if controlled else None
         return majorants.build(case.majorant, self.medium, bounds, case.tightness, control)
 
     def largest_score(self, estimand: str) -> float:
-        """What no score exceeds as long as weights stay below 1."""
+        """What no score exceeds while weights stay below 1, or below the number of channels."""
         if estimand == "transmittance":
-            return 1.0
+            return float(len(self.medium.channels))
         if estimand == "free_path":
-            return float(self.segments[:, 6].max())
+            return float(self.segments[:, 6].max()) * len(self.medium.channels)
         return float(self.bounds((1, 1, 1))[1].max())
 
 
@@ -109,6 +112,8 @@ def structure_of(
         majorant_numbers=majorants.numbers_of(case.majorant, tracker.needs),
         lanes=device.info.lanes if case.lanes == "auto" else int(case.lanes),
         arithmetic=case.arithmetic,
+        channels=len(medium.channels),
+        chromatic=tracker.channels == ANY,
         logarithm=device.info.logarithm,
         count=count,
         record=record,
@@ -122,13 +127,18 @@ def runner_of(
     controlled = "control" in structure.needs
     medium, majorant = scene.medium, scene.majorant(case, controlled=controlled)
     numbers = source.numbers_of(
-        structure, medium.extent.tolist(), medium.numbers, majorant.numbers, dict(case.params)
+        structure,
+        medium.extent.tolist(),
+        medium.numbers,
+        majorant.numbers,
+        medium.channels.tolist(),
+        dict(case.params),
     )
     # cases that share a majorant and a control share their buffer
     control = tuple(sorted(case.params.items())) if controlled else None
     buffer = data.keep((case.majorant, case.tightness, control), majorant.data)
     uploaded = program.device.upload(np.array(numbers, scalar_type(case.arithmetic)))
-    fixed = case.arithmetic, structure.lanes, case.seed
+    fixed = case.arithmetic, structure.lanes, case.seed, structure.channels
     return Runner(program, data, uploaded, buffer, *fixed)
 
 

@@ -42,11 +42,12 @@ static void next_sample(const Tally *tally, Path *path, Rng *rng, const mask whe
     const index number = block * (index)(INTEGER)samples + tally->done;
     Rng new_rng = stream(seed, to_bits(ray), first_sample, to_bits(number));
     Path new_path = *path;
-    new_path.t = new_path.depth = new_path.target = new_path.collected = (real)0;
+    new_path.t = new_path.depth = new_path.target = (real)0;
     new_path.weight = (real)1;
     new_path.live = (mask)-1;
     new_path.escaped = (mask)0;
     new_path.steps = (index)0;
+    channels_begin(&new_path);
     begin(&new_path, scene, &new_rng);
     const bits_mask narrow = narrow_mask(where);
     rng->s0 = choose(narrow, new_rng.s0, rng->s0);
@@ -59,7 +60,6 @@ static void next_sample(const Tally *tally, Path *path, Rng *rng, const mask whe
     path->majorant = choose(where, new_path.majorant, path->majorant);
     path->mean_free_path = choose(where, new_path.mean_free_path, path->mean_free_path);
     path->weight = choose(where, new_path.weight, path->weight);
-    path->collected = choose(where, new_path.collected, path->collected);
     path->live = choose(where, new_path.live, path->live);
     path->escaped = choose(where, new_path.escaped, path->escaped);
     path->steps = choose(where, new_path.steps, path->steps);

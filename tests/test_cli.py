@@ -165,7 +165,9 @@ def test_cases_as_json(call):
     assert code == 0
     (case,) = json.loads(out)
     assert case["name"] == "transmittance/homogeneous-1/regular/auto/strict"
-    assert case["medium"] == {"homogeneous": {"sigma_t": 1.0, "size": [1.0, 1.0, 1.0]}}
+    assert case["medium"] == {
+        "homogeneous": {"channels": None, "sigma_t": 1.0, "size": [1.0, 1.0, 1.0]}
+    }
 
 
 def test_a_run_prints_a_table_and_names_its_files(call, work, selector, device):

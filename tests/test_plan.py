@@ -133,6 +133,12 @@ def test_cases_of_one_name_are_told_apart(expand):
         ("transmittance", "layered: {breakpoints: 0.5, values: [1, 2]}", "exact", ""),
         ("mean_extinction", CLOUD, "delta", "delta does not estimate mean_extinction"),
         (
+            "transmittance",
+            "cloud: {resolution: 8, channels: [1, 0.5]}",
+            "delta",
+            "delta follows one channel, and the medium has 2",
+        ),
+        (
             "free_path",
             "gaussian: {sigma_t: 1, width: 1}",
             "cells",
@@ -255,6 +261,7 @@ def test_identity_is_canonical_json(expand):
                 "seed": 1,
                 "sigma_t": 200.0,
                 "floor": 0.0,
+                "channels": None,
                 "interpolation": "trilinear",
                 "size": [1.0, 1.0, 1.0],
             }

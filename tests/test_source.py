@@ -42,6 +42,7 @@ def test_a_source_has_what_the_case_needs_and_nothing_else():
         "count/off.cl",
         "medium/homogeneous.cl",
         "lanes/path.cl",
+        "channels/one.cl",
         "majorant/global.cl",
         "trackers/mine.cl",
         "lanes/tally.cl",
@@ -120,7 +121,7 @@ def test_numbers_are_declared_in_the_order_in_which_they_are_given():
     names = [name for names, _ in declared for name in names.split(", ")]
     assert names == ["extent_x", "extent_y", "extent_z", "a", "b", "sigma_t", "step"]
     values = numbers_of(
-        structure, [1.0, 2.0, 3.0], {"b": 5.0, "a": 4.0}, {"sigma_t": 6.0}, {"step": 7.0}
+        structure, [1.0, 2.0, 3.0], {"b": 5.0, "a": 4.0}, {"sigma_t": 6.0}, [1.0], {"step": 7.0}
     )
     assert values == [1, 2, 3, 4, 5, 6, 7]
 
@@ -128,7 +129,7 @@ def test_numbers_are_declared_in_the_order_in_which_they_are_given():
 def test_a_tracker_without_a_majorant_is_given_no_numbers_of_one():
     structure = Structure(**DELTA | {"needs": frozenset()})
     assert "MajorantNumbers" not in compose(structure).text
-    assert numbers_of(structure, [1.0, 1.0, 1.0], {"sigma_t": 2.0}, {}, {}) == [1, 1, 1, 2]
+    assert numbers_of(structure, [1.0, 1.0, 1.0], {"sigma_t": 2.0}, {}, [1.0], {}) == [1, 1, 1, 2]
 
 
 def test_choices_become_defines():
@@ -149,7 +150,17 @@ def test_the_state_of_a_path_is_that_of_its_walk_and_its_tracker():
     for declared in ("index cell;", "real best;", "mask hit;"):
         assert f"    {declared}\n" in text
     assert "into->best = choose(where, from->best, into->best);" in text
-    assert "index unused;" in composed()
+
+
+def test_several_channels_have_a_weight_each():
+    text = composed(chromatic=True, channels=3)
+    assert "channels/several.cl" in files_of(text)
+    assert "#define CHANNELS 3" in text
+    assert "    real tint[CHANNELS];\n" in text
+    assert "into->tint[c] = choose(where, from->tint[c], into->tint[c]);" in text
+    structure = Structure(**DELTA | {"chromatic": True, "channels": 3})
+    values = numbers_of(structure, [1, 1, 1], {"sigma_t": 2}, {"sigma_t": 3}, [4, 6, 5], {})
+    assert values == [1, 1, 1, 2, 3, 4, 6, 5, 6]
 
 
 def test_a_tracker_may_not_take_the_state_of_its_walk():

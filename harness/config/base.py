@@ -69,8 +69,12 @@ def _explained(line: ErrorDetails, model: type[Model] | None) -> PydanticCustomE
 
 
 def _mapping(model: type[Model]) -> str:
-    keys = ", ".join(model.model_fields)
-    return f"a mapping with {keys}" if keys else "nothing more"
+    fields = model.model_fields
+    keys = list(fields)
+    if issubclass(model, Kind):
+        # what all media have is inherited and so comes first, but what must be given matters more
+        keys.sort(key=lambda name: not fields[name].is_required())
+    return f"a mapping with {', '.join(keys)}" if keys else "nothing more"
 
 
 def _known_keys(name: str, model: type[Model]) -> str:

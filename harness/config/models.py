@@ -1,18 +1,18 @@
-"""The kinds of media, majorants and rays that a config may name, with their parameters."""
+"""The kinds of media and majorants that a config may name, with their parameters."""
 
 import math
 from typing import Annotated, ClassVar, Literal
 
 from freepath.config.base import Kind
 from freepath.config.quantity import Number
-from freepath.config.rules import Choice, Exactly, OneOrMore, Text, expected, failure
+from freepath.config.rules import Choice, Exactly, OneOrMore, Several, Text, expected, failure
 from pydantic import AfterValidator, ValidationInfo, field_validator
 
 LARGEST_SEED = 2**64 - 1
 LARGEST_GRID = 1024
 MOST_CELLS = 2**27
 LARGEST_IMAGE = 4096
-MOST_CHORDS = 10_000_000
+MOST_CHANNELS = 32
 
 CLOSED_FORM = frozenset({"closed_form"})
 CELLS = frozenset({"cells"})
@@ -45,6 +45,7 @@ Seed = Annotated[int, Number("count", minimum=0, maximum=LARGEST_SEED)]
 Cells = Annotated[int, Number("count", minimum=1)]
 Pixels = Annotated[int, Number("count", minimum=1, maximum=LARGEST_IMAGE)]
 Fraction = Annotated[float, Number("fraction", above=0, maximum=1)]
+Factor = Annotated[float, Number(minimum=0)]
 
 Point = Annotated[tuple[Length, Length, Length], Exactly()]
 Direction = Annotated[tuple[Real, Real, Real], Exactly(), AfterValidator(_not_zero)]
@@ -56,13 +57,19 @@ Image = Annotated[tuple[Pixels, Pixels], Exactly(("width", "height"), spread=Tru
 Interpolation = Annotated[Literal["trilinear", "nearest"], Choice(("trilinear", "nearest"))]
 
 UNIT_CUBE = (1.0, 1.0, 1.0)
-UPWARD = (0.0, 0.0, 1.0)
 
 
 class Medium(Kind):
     """A medium; OFFERS says what a tracker may ask of it beside sigma_t at a point."""
 
     OFFERS: ClassVar[frozenset[str]] = frozenset()
+    channels: Annotated[tuple[Factor, ...], Several(2, MOST_CHANNELS)] | None = None
+    """Extinction of each channel relative to sigma_t, of two or more; grey if left out."""
+
+    @property
+    def channel_count(self) -> int:
+        """How many channels a path may follow; 1 of a grey medium."""
+        return len(self.channels or (1,))
 
 
 class Box(Medium):
@@ -229,67 +236,10 @@ class Octree(Kind):
     """Eight leaves are joined if that raises the integral of the majorant by at most so much."""
 
 
-class Orthographic(Kind):
-    """Parallel rays that frame the medium."""
-
-    kind: ClassVar[str] = "orthographic"
-    resolution: Image = (64, 64)
-    """Rays across and down."""
-    direction: Direction = UPWARD
-    """Where the rays go."""
-
-
-class Perspective(Kind):
-    """Rays from a pinhole camera."""
-
-    kind: ClassVar[str] = "perspective"
-    resolution: Image = (64, 64)
-    """Rays across and down."""
-    position: Point
-    """Where the camera stands."""
-    look_at: Point
-    """The point in the middle of the image."""
-    field_of_view: Annotated[float, Number(above=0, below=180)] = 45.0
-    """Vertical angle of view in degrees."""
-
-    @field_validator("look_at", mode="after")
-    @classmethod
-    def _elsewhere(cls, point: tuple[float, ...], info: ValidationInfo) -> tuple[float, ...]:
-        if point == info.data.get("position"):
-            raise failure("expected a point other than position, got the same one")
-        return point
-
-
-class Chords(Kind):
-    """Random chords of the box, isotropic and uniform (mu-random), from the config's seed."""
-
-    kind: ClassVar[str] = "chords"
-    count: Annotated[int, Number("count", minimum=1, maximum=MOST_CHORDS)]
-    """How many."""
-
-
-class Single(Kind):
-    """One ray."""
-
-    kind: ClassVar[str] = "single"
-    origin: Point
-    """Where it starts."""
-    direction: Direction
-    """Where it goes."""
-
-
-class File(Kind):
-    """Rays from a .npy of shape (N, 6) or a .csv with the header origin_x ... direction_z."""
-
-    kind: ClassVar[str] = "file"
-    path: Annotated[str, Text("a file name")]
-    """Looked for beside the config, then in $FREEPATH_VOLUMES."""
-
-
-def _by_kind(*models: type[Kind]) -> dict[str, type[Kind]]:
+def by_kind(*models: type[Kind]) -> dict[str, type[Kind]]:
+    """Return models by the names that a config gives them."""
     return {model.kind: model for model in models}
 
 
-MEDIA = _by_kind(Homogeneous, Linear, Exponential, Gaussian, Cosine, Layered, Cloud, Volume)
-MAJORANTS = _by_kind(Global, Grid, Octree)
-RAYS = _by_kind(Orthographic, Perspective, Chords, Single, File)
+MEDIA = by_kind(Homogeneous, Linear, Exponential, Gaussian, Cosine, Layered, Cloud, Volume)
+MAJORANTS = by_kind(Global, Grid, Octree)

@@ -194,6 +194,29 @@ class OneOrMore(_Wrapper):
 
 
 @dataclass(frozen=True)
+class Several(_Wrapper):
+    """A list of at least and at most so many values."""
+
+    least: int
+    most: int
+
+    def prepare(self, value: Any) -> Any:
+        """Return the list; one value alone is none."""
+        if not isinstance(value, (list, tuple)) or not self.least <= len(value) <= self.most:
+            raise expected(self.describe(), value)
+        return value
+
+    def describe(self) -> str:
+        """Return how many there may be."""
+        return f"a list of {self.least} to {self.most} numbers"
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        return {**handler(schema), "minItems": self.least, "maxItems": self.most}
+
+
+@dataclass(frozen=True)
 class Exactly(_Wrapper):
     """A list with one value for each of `names`; where `spread`, one value may stand for all."""
 

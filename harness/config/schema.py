@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from freepath.config.base import Kind, OneOf
-from freepath.config.models import MAJORANTS, MEDIA, RAYS
+from freepath.config.models import MAJORANTS, MEDIA
+from freepath.config.rays import RAYS
 from freepath.config.sweep import TRACKER, Config
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"

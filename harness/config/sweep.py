@@ -5,8 +5,9 @@ from typing import Annotated, Any
 
 from freepath.config.base import Kind, Model, OneOf
 from freepath.config.document import Document, Location, path_text
-from freepath.config.models import MAJORANTS, MEDIA, RAYS, Fraction, Global, Orthographic, Seed
+from freepath.config.models import MAJORANTS, MEDIA, Fraction, Global, Seed
 from freepath.config.quantity import Number
+from freepath.config.rays import RAYS, Orthographic
 from freepath.config.rules import Choice, OneOrMore, Text, expected
 from freepath.errors import Problem
 from pydantic import (

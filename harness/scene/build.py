@@ -25,7 +25,10 @@ def build_medium(model: Any, search_path: SearchPath = ()) -> Medium:
     A volume's file is looked for in the folders of `search_path` first, see `find_file`. Raises
     VolumeError for a file that is not found, cannot be read or holds no densities.
     """
-    return _KINDS[model.kind](model, search_path)
+    medium = _KINDS[model.kind](model, search_path)
+    if model.channels:
+        medium.channels = np.array(model.channels)
+    return medium
 
 
 def _homogeneous(model: Any, _: SearchPath) -> Medium:

@@ -45,8 +45,12 @@ class Medium(ABC):
     transform `to_medium` (3, 4) from the world does. Segments are rows of seven: entry point,
     direction per unit of world length, length in the world. Extinction is per unit of world
     length.
+
+    `channels` (C,) are the extinctions of the channels relative to sigma_t, which is that of none
+    of them where there are several; (1,) of a grey medium.
     """
 
+    channels: Array = np.ones(1)
     kernel: str
     offers: frozenset[str]
 

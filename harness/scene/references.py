@@ -7,6 +7,7 @@ import hashlib
 import numpy as np
 from freepath.scene.cache import cached
 from freepath.scene.medium import Array, Index, Medium, Pieces
+from freepath.scene.scaled import Scaled
 from freepath.scene.special import NODES, WEIGHTS
 
 VERSION = 1  # of the formulas below: a higher one makes cached references worthless
@@ -15,11 +16,14 @@ ROUNDS = 60  # halvings of a piece; it is then shorter than float64 tells apart
 
 
 def reference(estimand: str, medium: Medium, segments: Array) -> Array:
-    """Return the exact value of an estimand for segments (N, 7), as (N,) float64.
+    """Return the exact value of an estimand for segments (N, 7), as (N,) or (N, channels) float64.
 
     transmittance: exp(-tau). free_path: the mean of min(X, length) over the free path X, a world
     length. mean_extinction: the mean over the medium's box, the same for every segment.
     """
+    if len(medium.channels) > 1:
+        each = [Scaled(medium, factor) for factor in medium.channels]
+        return np.stack([reference(estimand, one, segments) for one in each], axis=1)
     if estimand == "mean_extinction":
         return np.full(len(segments), medium.mean())
     compute = {"transmittance": transmittance, "free_path": free_path}[estimand]

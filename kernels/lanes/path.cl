@@ -10,12 +10,11 @@ typedef struct {
     real majorant;            /* where the path is now */
     real mean_free_path;      /* 1 / majorant, FAR where the majorant is 0 */
     real weight;
-    real collected;           /* deposited so far, beside what the end of the flight will score */
     mask live;                /* -1 while the path goes on */
     mask escaped;             /* -1 once it has left the medium */
     index steps;
     index lookups, crossings, violations;    /* since the last tally, counted where count is on */
-    State state;              /* of the walk and of the tracker: the fields of their front matter */
+    State state;              /* of the walk, the channels and the tracker: fields of their front matter */
 } Path;
 
 /* The extinction at distance t: the only place where a lookup happens and is counted. */
@@ -24,21 +23,6 @@ static real sigma_t(Path *path, const Scene *scene, const real t, const mask her
     count(path->lookups, here);
     return sigma_t_at(scene, path->origin_x + t * path->direction_x, path->origin_y + t * path->direction_y,
                       path->origin_z + t * path->direction_z);
-}
-
-/* The extinction at a tentative collision. What exceeds the majorant by more than the rounding of an
-   interpolation is a violation. */
-static real sigma_t_at_tentative(Path *path, const Scene *scene, const mask here)
-{
-    const real sigma = sigma_t(path, scene, path->t, here);
-    count(path->violations, here & less(path->majorant * (SCALAR)1.000001, sigma));
-    return sigma;
-}
-
-/* Lanes `where` score a part of their weight as if the flight ended at t, and fly on. */
-static void deposit(Path *path, const real weight, const real t, const mask escaped, const mask where)
-{
-    path->collected = choose(where, path->collected + score(weight, t, escaped), path->collected);
 }
 
 /* Lanes `where` have collided: the flight ends at t, inside the medium. */

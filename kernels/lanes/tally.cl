@@ -1,12 +1,15 @@
 /* What a lane keeps of the unit it works on: a block of samples of one ray. Welford's update in the lane;
    the host merges units in double (Chan, Golub, LeVeque 1983), so no sum runs long in float. The mean is
    kept in two parts (Kahan 1965): where all scores are nearly 1, as in thin media, the share of one of
-   them is less than the last bit of a float, and the mean would stand still. */
+   them is less than the last bit of a float, and the mean would stand still. Of several channels the mean
+   over them is tallied too, as one more: they are correlated, and its variance tells by how much. */
+#define TALLIED (CHANNELS == 1 ? 1 : CHANNELS + 1)
+
 typedef struct {
     index unit;               /* -1: none */
     index done;               /* samples finished */
-    real mean, excess;        /* of their scores; the mean is mean - excess */
-    real m2;                  /* sum of squared deviations from it */
+    real mean[TALLIED], excess[TALLIED];    /* of their scores; the mean is mean - excess */
+    real m2[TALLIED];         /* sum of squared deviations from it */
     index steps;              /* over all samples */
     index truncated;          /* samples that reached the step cap */
     index nonfinite;          /* samples whose score is infinite or not a number; never left out */
@@ -15,9 +18,11 @@ typedef struct {
 static void tally_begin(Tally *tally, Path *path, const mask where)
 {
     tally->done = choose(where, (index)0, tally->done);
-    tally->mean = choose(where, (real)0, tally->mean);
-    tally->excess = choose(where, (real)0, tally->excess);
-    tally->m2 = choose(where, (real)0, tally->m2);
+    for (int i = 0; i < TALLIED; ++i) {
+        tally->mean[i] = choose(where, (real)0, tally->mean[i]);
+        tally->excess[i] = choose(where, (real)0, tally->excess[i]);
+        tally->m2[i] = choose(where, (real)0, tally->m2[i]);
+    }
     tally->steps = choose(where, (index)0, tally->steps);
     tally->truncated = choose(where, (index)0, tally->truncated);
     tally->nonfinite = choose(where, (index)0, tally->nonfinite);
@@ -26,20 +31,33 @@ static void tally_begin(Tally *tally, Path *path, const mask where)
     path->violations = choose(where, (index)0, path->violations);
 }
 
+/* Lanes `ended` have one more score x, the done-th. */
+static void tally_score(Tally *tally, const int i, const real x, const mask ended)
+{
+    const real deviation = x - tally->mean[i] + tally->excess[i];
+    const real rise = deviation / to_real(tally->done) - tally->excess[i];
+    const real mean = tally->mean[i] + rise;
+    const real excess = mean - tally->mean[i] - rise;
+    tally->m2[i] = choose(ended, tally->m2[i] + deviation * (x - mean + excess), tally->m2[i]);
+    tally->excess[i] = choose(ended, excess, tally->excess[i]);
+    tally->mean[i] = choose(ended, mean, tally->mean[i]);
+}
+
 static void tally_sample(Tally *tally, const Path *path, const mask ended, const mask truncated)
 {
-    const real x = path->collected + score(path->weight, path->t, path->escaped);
     tally->done -= ended;
     tally->steps += ended & path->steps;
     tally->truncated -= truncated;
-    tally->nonfinite -= ended & ~less(fabs(x), (real)INFINITY);
-    const real deviation = x - tally->mean + tally->excess;
-    const real rise = deviation / to_real(tally->done) - tally->excess;
-    const real mean = tally->mean + rise;
-    const real excess = mean - tally->mean - rise;
-    tally->m2 = choose(ended, tally->m2 + deviation * (x - mean + excess), tally->m2);
-    tally->excess = choose(ended, excess, tally->excess);
-    tally->mean = choose(ended, mean, tally->mean);
+    real sum = (real)0;
+    for (int c = 0; c < CHANNELS; ++c) {
+        const real x = score_of(path, c);
+        tally_score(tally, c, x, ended);
+        sum += x;
+    }
+    if (TALLIED > CHANNELS)
+        tally_score(tally, TALLIED - 1, sum / (SCALAR)CHANNELS, ended);
+    /* an infinite score makes the sum infinite, or no number */
+    tally->nonfinite -= ended & ~less(fabs(sum), (real)INFINITY);
 }
 
 /* The results of the units that lanes `where` have finished, in the order of the host's COUNTERS. */
@@ -47,12 +65,14 @@ static void tally_store(const Tally *tally, const Path *path, const mask where, 
                         __global uint *counters)
 {
     INTEGER finished[LANES], unit[LANES], values[6][LANES];
-    SCALAR mean[LANES], excess[LANES], m2[LANES];
+    SCALAR parts[TALLIED][3][LANES];
     store_lanes(where & ~less(tally->unit, (index)0), finished);
     store_lanes(tally->unit, unit);
-    store_lanes(tally->mean, mean);
-    store_lanes(tally->excess, excess);
-    store_lanes(tally->m2, m2);
+    for (int i = 0; i < TALLIED; ++i) {
+        store_lanes(tally->mean[i], parts[i][0]);
+        store_lanes(tally->excess[i], parts[i][1]);
+        store_lanes(tally->m2[i], parts[i][2]);
+    }
     store_lanes(path->lookups, values[0]);
     store_lanes(path->crossings, values[1]);
     store_lanes(path->violations, values[2]);
@@ -62,9 +82,8 @@ static void tally_store(const Tally *tally, const Path *path, const mask where, 
     for (int lane = 0; lane < LANES; ++lane) {
         if (!finished[lane])
             continue;
-        moments[3 * unit[lane]] = mean[lane];
-        moments[3 * unit[lane] + 1] = excess[lane];
-        moments[3 * unit[lane] + 2] = m2[lane];
+        for (int i = 0; i < 3 * TALLIED; ++i)
+            moments[3 * TALLIED * unit[lane] + i] = parts[i / 3][i % 3][lane];
         for (int i = 0; i < 6; ++i)
             counters[6 * unit[lane] + i] = (uint)values[i][lane];
     }

@@ -102,6 +102,7 @@ def test_every_kind_loads_and_loads_again_from_what_it_holds(load_text, small_ca
     assert media[0].parameters() == {
         "sigma_t": pytest.approx(5e-4),
         "size": (2000.0, 2000.0, 2000.0),
+        "channels": None,
     }
     assert media[7].breakpoints == (0.5,)
     assert media[10].voxel_size == (20.0, 20.0, 40.0)
@@ -196,7 +197,15 @@ BAD_MATRIX = [
         "expected a medium as a single key, got 2 keys; indent 'resolution' deeper than 'cloud'",
     ),
     ("medium: {cloud: 1, volume: 2}", 4, 11, "matrix.medium: expected a medium as a single key"),
-    ("medium: {cloud: [1]}", 4, 19, "expected a mapping with resolution, seed, sigma_t"),
+    (
+        "medium: {cloud: {resolution: 8, channels: [1]}}",
+        4,
+        45,
+        "channels: expected a list of 2 to 32 numbers, got a list of 1",
+    ),
+    ("medium: {cloud: {resolution: 8, channels: [1, -1]}}", 4, 49, "a number >= 0, got -1"),
+    ("medium: {cloud: {resolution: 8, channels: red}}", 4, 45, "got 'red'"),
+    ("medium: {cloud: [1]}", 4, 19, "expected a mapping with resolution, channels, seed"),
     ("medium: [[cloud]]", 4, 12, "matrix.medium[0]: expected a medium (one of"),
     ("medium: {cloud: {resolution: 1}}", 4, 32, "expected an integer from 2 to 1024, got 1"),
     ("medium: {cloud: {resolution: 8.5}}", 4, 32, "expected an integer from 2 to 1024, got 8.5"),

@@ -108,4 +108,4 @@ def write_slices(path, slices, attributes=()):
 def volume_model(file, **changes):
     """Return what the config's model of a volume offers."""
     defaults = {"sigma_t": 1.0, "grid": None, "interpolation": "trilinear", "voxel_size": None}
-    return SimpleNamespace(kind="volume", file=str(file), **(defaults | changes))
+    return SimpleNamespace(kind="volume", file=str(file), channels=None, **(defaults | changes))

@@ -31,7 +31,7 @@ AT_ONE = {
 
 @pytest.mark.parametrize("kind", MODELS)
 def test_closed_forms(kind):
-    medium = build_medium(SimpleNamespace(kind=kind, size=SIZE, **MODELS[kind]))
+    medium = build_medium(SimpleNamespace(kind=kind, channels=None, size=SIZE, **MODELS[kind]))
     assert medium.kernel == kind
     assert medium.extent.tolist() == list(SIZE)
     assert medium.to_medium.tolist() == np.eye(3, 4).tolist()
@@ -41,6 +41,7 @@ def test_closed_forms(kind):
 @pytest.mark.parametrize("interpolation", ["trilinear", "nearest"])
 def test_cloud(interpolation):
     model = SimpleNamespace(
+        channels=None,
         kind="cloud",
         resolution=8,
         seed=3,
@@ -70,6 +71,7 @@ def test_volume_size_and_scale(tmp_path):
 
 def test_the_floor_of_a_cloud_is_its_homogeneous_part():
     model = SimpleNamespace(
+        channels=None,
         kind="cloud",
         resolution=8,
         seed=3,
@@ -84,6 +86,7 @@ def test_the_floor_of_a_cloud_is_its_homogeneous_part():
 
 def test_a_scaled_cloud_that_overflows_is_refused():
     model = SimpleNamespace(
+        channels=None,
         kind="cloud",
         resolution=4,
         seed=1,

@@ -48,6 +48,9 @@ class Samples:
     score: np.ndarray
     """What each contributes to the mean."""
     round: Round
+    weights: np.ndarray
+    scores: np.ndarray
+    """Of each channel, (channels, rays, samples); those above are of the first."""
 
 
 @dataclass(frozen=True)
@@ -80,15 +83,15 @@ class Flight:
     def record(self, samples: int, blocks: int = 1, **options: Any) -> Samples:
         """Take samples and keep each."""
         one = self.run(samples, blocks, **options)
-        recorded = one.recorded.reshape(blocks, -1, samples, 5).astype(np.float64)
-        t, weight, escaped, counted, score = np.moveaxis(recorded, -1, 0)
+        width = one.recorded.shape[-1]
+        recorded = one.recorded.reshape(blocks, -1, samples, width).astype(np.float64)
+        values = np.moveaxis(recorded, (3, 1), (0, 1))
         # lookups are a running count of each unit
-        lookups = np.diff(counted, axis=2, prepend=0.0)
-        t, weight, escaped, lookups, score = (
-            np.swapaxes(array, 0, 1).reshape(-1, blocks * samples)
-            for array in (t, weight, escaped, lookups, score)
-        )
-        return Samples(t, weight, escaped > 0, lookups, score, one)
+        values[3] = np.diff(values[3], axis=2, prepend=0.0)
+        values = values.reshape(width, -1, blocks * samples)
+        weights, scores = values[[1, *range(5, width, 2)]], values[4::2]
+        t, weight, escaped, lookups, score = values[:5]
+        return Samples(t, weight, escaped > 0, lookups, score, one, weights, scores)
 
 
 class Rig:
