@@ -124,6 +124,7 @@ class FrontMatter(Model):
         MAJORANTS
     )
     bounding: Annotated[bool | dict[str, tuple[Any, ...]], Bounding()] = False
+    single_flight: Annotated[bool | dict[str, tuple[Any, ...]], Bounding()] = False
     unbiased: Annotated[bool, Flag()] = True
     parameters: dict[str, Parameter] = {}
     state: dict[str, Annotated[str, Text("real, mask or index, or an array of them", STATE)]] = {}
@@ -160,6 +161,8 @@ class Tracker:
     majorants: tuple[str, ...]
     bounding: bool | dict[str, tuple[Any, ...]]
     """Whether it is only right where the majorant bounds; or for which choices of a parameter."""
+    single_flight: bool | dict[str, tuple[Any, ...]]
+    """Whether, or for which choices, what it scores on its way is for no path that goes on."""
     unbiased: bool
     parameters: dict[str, Parameter]
     state: dict[str, str]
@@ -247,6 +250,7 @@ def read(file: Path) -> Tracker:
         channels=front.channels,
         majorants=front.majorants,
         bounding=front.bounding,
+        single_flight=front.single_flight,
         unbiased=front.unbiased,
         parameters=front.parameters,
         state=front.state,

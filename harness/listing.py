@@ -21,6 +21,12 @@ Record = dict[str, Any]
 EFFECTS = {
     "absorption": "every medium takes light out of the ray",
     "heterogeneous": "the extinction varies: a lookup at each tentative collision",
+    "emission": "the medium emits: collected where a path is absorbed",
+    "environment": "light from outside: collected where a path leaves",
+    "scattering": "a path goes on in a new direction; phase: isotropic, Henyey-Greenstein or rod",
+    "roulette": "scatterings without limit: a path of little weight may end",
+    "point_light": "a shadow ray at each scattering, with a tracker of its own",
+    "length": "the length of paths instead of what they collect",
     "chromatic": "a weight for each channel: one lookup and one path serve all",
     "majorant_grid": "a majorant for each cell: a walk by DDA between tentative collisions",
 }

@@ -14,11 +14,13 @@ from typing import Any
 
 from freepath.catalog import ANY, Catalog, Tracker
 from freepath.config.base import Kind
-from freepath.config.sweep import AXES, Config, Exclude, Include, Stop
+from freepath.config.sweep import ALONG_PATHS, AXES, Config, Exclude, Include, Stop
 from freepath.errors import ConfigError, NothingMatchedError, Problem
 
 MOST_CASES = 100_000
 ID_LENGTH = 12
+SHADOW = "ratio"
+"""The tracker of shadow rays that a config need not name."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -44,10 +46,17 @@ class Case:
     seed: int
     stop: Stop
     skip_reason: str
+    light: Kind | None = None
+    scatterings: int | str | None = None
+    shadow: Kind | None = None
+    effects: str | None = None
+    """These four are of paths that scatter, None for other estimands; `shadow` is None without a
+    point light."""
 
     def identity(self) -> dict[str, Any]:
         """Return everything that defines the case but its place and the device, fit for JSON."""
-        return {
+        paths = {} if self.light is None else self._of_paths()
+        return paths | {
             "estimand": self.estimand,
             "medium": self.medium.as_dict(),
             "majorant": self.majorant.as_dict() if self.majorant else None,
@@ -58,6 +67,14 @@ class Case:
             "rays": self.rays.as_dict(),
             "seed": self.seed,
             "stop": self.stop.model_dump(mode="json"),
+        }
+
+    def _of_paths(self) -> dict[str, Any]:
+        return {
+            "light": self.light.as_dict(),
+            "scatterings": self.scatterings,
+            "shadow": self.shadow.as_dict() if self.shadow else None,
+            "effects": self.effects,
         }
 
     @property
@@ -89,6 +106,9 @@ def expand(config: Config, catalog: Catalog) -> list[Case]:
     (unless axes are overridden) and for too many cases, NothingMatchedError if none is left.
     """
     matrix = {axis: getattr(config.matrix, axis) for axis in AXES}
+    if matrix["shadow"] is None:
+        default = catalog.trackers.get(SHADOW)
+        matrix["shadow"] = (default.model() if default else None,)
     _refuse_too_many(config, matrix)
     points = _excluded(config, _points(matrix, catalog))
     for entry in config.include:
@@ -122,7 +142,12 @@ def _points(axes: dict[str, tuple[Any, ...]], catalog: Catalog) -> dict[tuple[An
     points = {}
     for values in itertools.product(*(axes[axis] for axis in AXES)):
         point = dict(zip(AXES, values, strict=True))
-        if "majorant" not in catalog.trackers[point["tracker"].kind].needs:
+        if point["estimand"] not in ALONG_PATHS:
+            point |= dict.fromkeys(("light", "scatterings", "shadow", "effects"))
+        elif "position" not in type(point["light"]).model_fields and point["effects"] == "auto":
+            point["shadow"] = None
+        trackers = [kind for kind in (point["tracker"], point["shadow"]) if kind]
+        if not any("majorant" in catalog.trackers[kind.kind].needs for kind in trackers):
             point["majorant"] = point["tightness"] = None
         points[tuple(point.values())] = point
     return points
@@ -166,7 +191,7 @@ def _case(index: int, point: Point, config: Config, catalog: Catalog) -> Case:
         rays=config.rays,
         seed=config.seed,
         stop=config.stop,
-        skip_reason=_skip_reason(tracker, point),
+        skip_reason=_skip_reason(tracker, point) or _path_reason(tracker, point, catalog),
         **{axis: point[axis] for axis in AXES if axis != "tracker"},
     )
 
@@ -179,13 +204,37 @@ def _skip_reason(tracker: Tracker, point: Point) -> str:
     if majorant and majorant.kind not in tracker.majorants:
         reasons.append(f"{tracker.name} does not work with a majorant {majorant.kind}")
     channels = point["medium"].channel_count
-    if tracker.channels not in (ANY, channels):
+    factors = set(point["medium"].channels or ())
+    alike = point["light"] is not None and tracker.channels == 1 and factors <= {1.0}
+    if tracker.channels not in (ANY, channels) and not alike:
         follows = f"{tracker.name} follows {_counted(tracker.channels)}"
         reasons.append(f"{follows}, and the medium has {channels}")
     for need in sorted(tracker.needs - {"majorant", "control"} - point["medium"].OFFERS):
         what = need.replace("_", " ")
         reasons.append(f"{tracker.name} needs {what}, which {point['medium'].kind} does not offer")
     return "; ".join(reasons)
+
+
+def _path_reason(tracker: Tracker, point: Point, catalog: Catalog) -> str:
+    """Why the shadow rays of a case cannot work; '' where they can, or where there are none."""
+    single, given = tracker.single_flight, point["tracker"].parameters()
+    if point["light"] and isinstance(single, dict):
+        for name, choices in single.items():
+            if given[name] in choices:
+                return f"{tracker.name} with {name} {given[name]} is for single flights"
+    if point["shadow"] is None:
+        return ""
+    shadow = catalog.trackers[point["shadow"].kind]
+    reason = _skip_reason(shadow, point | {"estimand": "transmittance"})
+    if reason:
+        return f"shadow: {reason}"
+    if "control" in shadow.needs ^ tracker.needs:
+        return f"{tracker.name} and {shadow.name} of shadows need different walks"
+    if point["medium"].phase == "rod":
+        return "the rod model has no chance to scatter towards a point"
+    if shadow.name == tracker.name and point["shadow"] != point["tracker"]:
+        return f"{tracker.name} cannot have other parameters for shadows"
+    return ""
 
 
 def _counted(channels: int | str) -> str:
@@ -196,6 +245,10 @@ def _name(point: Point) -> str:
     parts = [point["estimand"], label(point["medium"])]
     if point["majorant"]:
         parts += [label(point["majorant"]), f"t{_short(point['tightness'])}"]
+    if point["light"]:
+        parts += [label(point["light"]), f"s{point['scatterings']}"]
+        parts += [label(point["shadow"])] if point["shadow"] else []
+        parts += ["effects=all"] if point["effects"] == "all" else []
     lanes = point["lanes"]
     parts += [label(point["tracker"]), lanes if lanes == "auto" else f"l{lanes}"]
     return "/".join([*parts, point["arithmetic"]])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
@@ -46,9 +46,11 @@ def base_row(case: Case, device: DeviceInfo, run_id: str) -> dict[str, Any]:
     }
 
 
-def effects_of(case: Case, medium_kernel: str) -> str:
-    """What the kernel of a case was composed for."""
+def effects_of(case: Case, medium_kernel: str, along: Iterable[str] = ()) -> str:
+    """What the kernel of a case was composed for; `along` are the effects along its paths."""
     effects = ["absorption"]
+    if case.light is not None:
+        effects += along
     if medium_kernel != "homogeneous":
         effects.append("heterogeneous")
     if case.majorant and case.majorant.kind == "grid":
@@ -62,13 +64,13 @@ def measured_row(
     row: dict[str, Any],
     tracker: Tracker,
     found: Measurement,
-    reference: np.ndarray,
+    reference: np.ndarray | None,
     largest_score: float,
 ) -> dict[str, Any]:
     """Fill in what was measured. A row whose numbers cannot be trusted says so in its status.
 
-    `reference` is of the shape (rays,) or (rays, channels); `largest_score` bounds the scores of
-    unbiased trackers.
+    `reference` is of the shape (rays,) or (rays, channels), None where it is unknown;
+    `largest_score` bounds the scores of unbiased trackers.
     """
     with np.errstate(invalid="ignore", over="ignore"):
         result = accuracy(found.moments, reference)

@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from freepath import kernel_files
+from freepath.effects import Effects
 from freepath.errors import CatalogError
 from freepath.kernel_files import KernelFile
 
@@ -40,6 +41,8 @@ class Structure:
     channels: int = 1
     chromatic: bool = False
     """Whether a path has a weight for each channel, be it one; or one weight."""
+    paths: Effects | None = None
+    """What happens along paths that scatter; None where a sample is one flight."""
     tracker_state: tuple[tuple[str, str], ...] = ()
     logarithm: str = "polynomial"
     count: bool = False
@@ -82,7 +85,10 @@ def compose(structure: Structure) -> Source:
     middle += [f"medium/{structure.medium}", "lanes/path"]
     parts += _named(kernel_files.read(name) for name in middle)
     parts += _named([channels, *walks])
-    parts += _named([KernelFile(f"trackers/{structure.tracker}.cl", structure.tracker_code)])
+    tracker = KernelFile(f"trackers/{structure.tracker}.cl", structure.tracker_code)
+    paths = structure.paths
+    exact = structure.arithmetic == "double"
+    parts += _named(paths.around(tracker, exact=exact) if paths else [tracker])
     record = "record/samples" if structure.record else "record/nothing"
     parts += _named(kernel_files.read(name) for name in ("lanes/tally", record, "main"))
     return Source("\n".join(parts), BUILD_OPTIONS[structure.arithmetic])
@@ -142,7 +148,8 @@ def _defines(structure: Structure) -> str:
     ]
     if double:
         lines.insert(0, "#pragma OPENCL EXTENSION cl_khr_fp64 : enable")
-    for parameter, chosen, choices in structure.choices:
+    shadow = structure.paths.shadow if structure.paths else None
+    for parameter, chosen, choices in structure.choices + (shadow.choices if shadow else ()):
         name = parameter.upper()
         lines += [f"#define {name}_{choice.upper()} {i}" for i, choice in enumerate(choices)]
         lines.append(f"#define {name} {name}_{chosen.upper()}")
@@ -158,12 +165,16 @@ def _structs(structure: Structure, walks: list[KernelFile]) -> str:
         "channels": ("extinction[CHANNELS]", "largest") if structure.chromatic else (),
         "tracker": structure.tracker_numbers,
     }
+    if structure.paths:
+        groups |= structure.paths.groups
+        shadow = structure.paths.shadow
+        groups["shadow_tracker"] = shadow.numbers if shadow else ()
     groups = {group: names for group, names in groups.items() if names}
     lines = ['#line 1 "structs"']
     for group, names in groups.items():
         fields = ", ".join(names)
-        lines.append(f"typedef struct {{ SCALAR {fields}; }} {group.capitalize()}Numbers;")
-    members = " ".join(f"{group.capitalize()}Numbers {group};" for group in groups)
+        lines.append(f"typedef struct {{ SCALAR {fields}; }} {_type_of(group)};")
+    members = " ".join(f"{_type_of(group)} {group};" for group in groups)
     lines.append(f"typedef struct {{ {members} }} Numbers;")
     pointers = "__global const float *medium_data; __global const float *majorant_data;"
     lines.append(f"typedef struct {{ {members} {pointers} }} Scene;")
@@ -180,6 +191,10 @@ def _structs(structure: Structure, walks: list[KernelFile]) -> str:
     return "\n".join(lines + _state(structure, walks))
 
 
+def _type_of(group: str) -> str:
+    return f"{group.title().replace('_', '')}Numbers"
+
+
 def _state(structure: Structure, walks: list[KernelFile]) -> list[str]:
     """Declare what a path carries for its walk and its tracker, and how lanes take it over."""
     state = {name: kind for file in walks for name, kind in file.state.items()}
@@ -188,6 +203,9 @@ def _state(structure: Structure, walks: list[KernelFile]) -> list[str]:
         message = f"expected a name for its state other than '{taken[0]}', which a walk uses"
         raise CatalogError(f"trackers/{structure.tracker}.cl: {message}")
     state |= dict(structure.tracker_state)
+    if structure.paths:
+        state |= structure.paths.state
+        state |= dict(structure.paths.shadow.state) if structure.paths.shadow else {}
     lines = ["typedef struct {"]
     for name, kind in state.items():
         scalar, bracket, count = kind.replace("spectrum", "real[CHANNELS]").partition("[")
@@ -216,6 +234,7 @@ def numbers_of(
     majorant: dict[str, float],
     channels: list[float],
     tracker: dict[str, float],
+    shadow: dict[str, float] | None = None,
 ) -> list[float]:
     """The values of the kernel's Numbers, in the order in which compose declares them."""
     values = [*box, *(medium[name] for name in structure.medium_numbers)]
@@ -223,4 +242,9 @@ def numbers_of(
         values += [majorant[name] for name in structure.majorant_numbers]
     if structure.chromatic:
         values += [*channels, max(channels)]
-    return values + [tracker[name] for name in structure.tracker_numbers]
+    values += [tracker[name] for name in structure.tracker_numbers]
+    if structure.paths:
+        values += structure.paths.numbers
+        if structure.paths.shadow:
+            values += [shadow[name] for name in structure.paths.shadow.numbers]
+    return values

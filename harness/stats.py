@@ -93,23 +93,25 @@ class Accuracy:
     """How an estimate stands to its reference; of one sample a ray, averaged over rays."""
 
     estimate: float
-    reference: float
-    bias: float
+    reference: float | None
+    """None where the exact value is not known; then so is the bias."""
+    bias: float | None
     bias_stderr: float
-    bias_rms: float
+    bias_rms: float | None
     variance: float
     samples: int
     """Of all rays together."""
 
     @property
     def z_score(self) -> float | None:
-        """The bias in standard errors; None for an estimator without variance, which has none."""
-        return self.bias / self.bias_stderr if self.bias_stderr > 0 else None
+        """The bias in standard errors; None where it is unknown or nothing varies."""
+        known = self.bias is not None and self.bias_stderr > 0
+        return self.bias / self.bias_stderr if known else None
 
     @property
     def rmse(self) -> float:
         """Root mean square error of one sample."""
-        return math.sqrt(self.variance + self.bias_rms**2)
+        return math.sqrt(self.variance + (self.bias_rms or 0.0) ** 2)
 
     @property
     def unseen(self) -> bool:
@@ -123,6 +125,8 @@ class Accuracy:
         Where high scores are rare (a transmittance of 1e-20), scores and their variance may be 0
         for a million samples, which says nothing: what is missing must then amount to RARE scores.
         """
+        if self.bias is None:
+            return False
         off = abs(self.bias) - rounding * abs(self.reference)
         if self.variance == 0 and self.estimate != 0:
             return off > 0
@@ -133,30 +137,38 @@ class Accuracy:
         """Device seconds a ray until the relative RMSE falls to an error; inf if it never does.
 
         Solves RMSE(t)^2 = bias^2 + variance * time_per_sample / t; one sample is the least. None
-        where the variance is unknown.
+        where the variance is unknown. Where the reference is, the error is that of the estimate,
+        taken to be unbiased.
         """
         if self.unseen:
             return None
-        room = (relative_error * self.reference) ** 2 - self.bias_rms**2
+        scale = self.estimate if self.reference is None else self.reference
+        room = (relative_error * scale) ** 2 - (self.bias_rms or 0.0) ** 2
         if self.variance == 0:
             return time_per_sample if room >= 0 else math.inf
         return time_per_sample * max(1.0, self.variance / room) if room > 0 else math.inf
 
 
-def accuracy(moments: Moments, reference: np.ndarray) -> Accuracy:
-    """Compare the merged moments of all rounds with the float64 reference, shaped as the mean.
+def accuracy(moments: Moments, reference: np.ndarray | None) -> Accuracy:
+    """Compare the merged moments of all rounds with the float64 reference, if there is one.
+
+    It is shaped as the mean, or (rays,) for channels that are all alike.
 
     Of several channels all is averaged over them too; that they are correlated is in `bias_stderr`.
     """
     rays = len(moments.mean)
     error_of_mean = moments.variance / moments.count
-    deviation = moments.mean - reference
+    deviation = None
+    if reference is not None:
+        if reference.ndim < moments.mean.ndim:
+            reference = reference[:, None]
+        deviation = moments.mean - reference
     return Accuracy(
         estimate=float(moments.mean.mean()),
-        reference=float(reference.mean()),
-        bias=float(deviation.mean()),
+        reference=None if deviation is None else float(reference.mean()),
+        bias=None if deviation is None else float(deviation.mean()),
         bias_stderr=math.sqrt(float((moments.joint_variance / moments.count).sum())) / rays,
-        bias_rms=_significant_bias(deviation, error_of_mean),
+        bias_rms=None if deviation is None else _significant_bias(deviation, error_of_mean),
         variance=float(moments.variance.mean()),
         samples=rays * moments.count,
     )

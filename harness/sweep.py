@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from freepath import majorants, source
+from freepath import effects, majorants, source
 from freepath.catalog import ANY, Catalog
+from freepath.config.sweep import ALONG_PATHS
 from freepath.device import Device, Program, scalar_type
 from freepath.errors import BuildError, FreepathError, RunError
 from freepath.majorants import Majorant
@@ -18,7 +20,7 @@ from freepath.plan import Case
 from freepath.results import ResultFolder
 from freepath.rows import base_row, effects_of, measured_row, round_rows
 from freepath.runner import KernelData, Runner
-from freepath.scene import Medium, make_rays, reference, segments
+from freepath.scene import Medium, make_rays, path_reference, reference, segments
 from freepath.source import Source, Structure
 from freepath.stopping import Rule
 
@@ -53,9 +55,13 @@ class Scene:
             lambda: source.combined_hash(self.medium.fingerprint, self.segments.tobytes()),
         )
 
-    def reference(self, estimand: str) -> np.ndarray:
-        """The exact value of an estimand for each ray (rays,)."""
-        return self._keep(estimand, lambda: reference(estimand, self.medium, self.segments))
+    def reference(self, case: Case) -> np.ndarray | None:
+        """The exact value of a case for each ray, (rays,) or (rays, channels); None without one."""
+        if case.light is None:
+            key = case.estimand
+            return self._keep(key, lambda: reference(key, self.medium, self.segments))
+        key = (case.estimand, case.light, case.scatterings)
+        return self._keep(key, lambda: path_reference(case, self.medium, self.segments))
 
     def bounds(self, cells: tuple[int, int, int]) -> tuple[np.ndarray, np.ndarray]:
         """The tightest minorant and majorant of each cell, [nz, ny, nx]."""
@@ -79,6 +85,8 @@ class Scene:
         """What no score exceeds while weights stay below 1, or below the number of channels."""
         if estimand == "transmittance":
             return float(len(self.medium.channels))
+        if estimand in ALONG_PATHS:
+            return math.inf
         if estimand == "free_path":
             return float(self.segments[:, 6].max()) * len(self.medium.channels)
         return float(self.bounds((1, 1, 1))[1].max())
@@ -98,10 +106,15 @@ def structure_of(
     parameters = [(name, p) for name, p in tracker.parameters.items() if not p.host]
     choices = [(name, p.choices) for name, p in parameters if p.choices is not None]
     majorant = case.majorant.kind if case.majorant else None
+    chromatic = tracker.channels == ANY
+    paths = None
+    if case.light is not None:
+        paths = effects.of_scene(case, medium, _shadow(case, catalog), chromatic=chromatic)
+    needs = tracker.needs | (paths.shadow.needs if paths and paths.shadow else frozenset())
     return Structure(
         tracker=tracker.name,
         tracker_code=tracker.code,
-        needs=tracker.needs,
+        needs=needs,
         tracker_numbers=tuple(name for name, p in parameters if p.choices is None),
         tracker_state=tuple(tracker.state.items()),
         choices=tuple((n, str(case.params[n]), tuple(map(str, given))) for n, given in choices),
@@ -109,14 +122,32 @@ def structure_of(
         medium=medium.kernel,
         medium_numbers=tuple(medium.numbers),
         majorant=majorant,
-        majorant_numbers=majorants.numbers_of(case.majorant, tracker.needs),
+        majorant_numbers=majorants.numbers_of(case.majorant, needs),
         lanes=device.info.lanes if case.lanes == "auto" else int(case.lanes),
         arithmetic=case.arithmetic,
-        channels=len(medium.channels),
-        chromatic=tracker.channels == ANY,
+        channels=paths.channels if paths else len(medium.channels),
+        chromatic=paths.chromatic if paths else chromatic,
+        paths=paths,
         logarithm=device.info.logarithm,
         count=count,
         record=record,
+    )
+
+
+def _shadow(case: Case, catalog: Catalog) -> effects.Shadow | None:
+    """The tracker of the shadow rays of a case."""
+    if case.shadow is None:
+        return None
+    tracker = catalog.trackers[case.shadow.kind]
+    given = case.shadow.parameters()
+    parameters = [(name, p) for name, p in tracker.parameters.items() if not p.host]
+    return effects.Shadow(
+        tracker.name,
+        tracker.code,
+        tracker.needs,
+        tuple(name for name, p in parameters if p.choices is None),
+        tuple((n, str(given[n]), tuple(map(str, p.choices))) for n, p in parameters if p.choices),
+        tuple(tracker.state.items()),
     )
 
 
@@ -131,8 +162,9 @@ def runner_of(
         medium.extent.tolist(),
         medium.numbers,
         majorant.numbers,
-        medium.channels.tolist(),
+        np.broadcast_to(medium.channels, structure.channels).tolist(),
         dict(case.params),
+        case.shadow.parameters() if case.shadow else {},
     )
     # cases that share a majorant and a control share their buffer
     control = tuple(sorted(case.params.items())) if controlled else None
@@ -182,6 +214,8 @@ class Sweep:
         job = Job(case, row)
         if not row["reason"]:
             job.structure = self._structure(case, scene, count=False)
+            along = job.structure.paths.names if job.structure.paths else ()
+            row["effects"] = effects_of(case, scene.medium.kernel, along)
             job.timed = source.compose(job.structure)
             job.counting = source.compose(self._structure(case, scene, count=True))
             if self.device.info.slow_compiler:
@@ -260,7 +294,7 @@ class Sweep:
         by_bench = {job.bench: job for job in jobs}
         self.on_progress(0.0, "computing references")
         for job in jobs:
-            scene.reference(job.case.estimand)  # now, and not between two rounds
+            scene.reference(job.case)  # now, and not between two rounds
 
         def on_error(bench: Bench, error: RunError) -> None:
             self._fail(by_bench[bench], error)
@@ -274,9 +308,10 @@ class Sweep:
             )
 
     def _measured(self, job: Job, scene: Scene) -> None:
-        estimand, found = job.case.estimand, job.bench.measurement
+        found = job.bench.measurement
         tracker = self.catalog.trackers[job.case.tracker]
-        values, largest = scene.reference(estimand), scene.largest_score(estimand)
+        values = scene.reference(job.case)
+        largest = scene.largest_score(job.case.estimand)
         row = measured_row(job.row, tracker, found, values, largest)
         self._finish(job, row, round_rows(row, found))
 

@@ -1,7 +1,7 @@
 """The kinds of media and majorants that a config may name, with their parameters."""
 
 import math
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from freepath.config.base import Kind
 from freepath.config.quantity import Number
@@ -13,6 +13,7 @@ LARGEST_GRID = 1024
 MOST_CELLS = 2**27
 LARGEST_IMAGE = 4096
 MOST_CHANNELS = 32
+PHASES = ("henyey_greenstein", "rod")
 
 CLOSED_FORM = frozenset({"closed_form"})
 CELLS = frozenset({"cells"})
@@ -31,6 +32,10 @@ def _not_too_many(resolution: tuple[int, ...]) -> tuple[int, ...]:
     return resolution
 
 
+def _counted(channels: int) -> str:
+    return "one value" if channels == 1 else f"one value or {channels}, one a channel"
+
+
 def _power_of_two(count: int) -> int:
     if count & (count - 1):
         raise failure(f"expected a power of two, got {count}")
@@ -45,6 +50,9 @@ Seed = Annotated[int, Number("count", minimum=0, maximum=LARGEST_SEED)]
 Cells = Annotated[int, Number("count", minimum=1)]
 Pixels = Annotated[int, Number("count", minimum=1, maximum=LARGEST_IMAGE)]
 Fraction = Annotated[float, Number("fraction", above=0, maximum=1)]
+Shares = Annotated[
+    tuple[Annotated[float, Number("fraction", minimum=0, maximum=1)], ...], OneOrMore()
+]
 Factor = Annotated[float, Number(minimum=0)]
 
 Point = Annotated[tuple[Length, Length, Length], Exactly()]
@@ -65,6 +73,22 @@ class Medium(Kind):
     OFFERS: ClassVar[frozenset[str]] = frozenset()
     channels: Annotated[tuple[Factor, ...], Several(2, MOST_CHANNELS)] | None = None
     """Extinction of each channel relative to sigma_t, of two or more; grey if left out."""
+    albedo: Shares = (0.0,)
+    """Share of the extinction that scatters, of radiance; one number, or one a channel."""
+    emission: Annotated[tuple[Factor, ...], OneOrMore()] = (0.0,)
+    """Radiance of the source where the medium absorbs; one number, or one a channel."""
+    phase: Annotated[str, Choice(PHASES)] = "henyey_greenstein"
+    """Where it scatters to; rod is forward or backward along the ray."""
+    g: Annotated[float, Number("fraction", above=-1, below=1)] = 0.0
+    """Mean cosine of the angle of scattering, of henyey_greenstein; 0 is isotropic."""
+
+    @field_validator("albedo", "emission", mode="after")
+    @classmethod
+    def _a_value_a_channel(cls, values: tuple[float, ...], info: ValidationInfo) -> Any:
+        channels = len(info.data.get("channels") or (1,))
+        if len(values) not in (1, channels):
+            raise failure(f"expected {_counted(channels)}, got {len(values)}")
+        return values
 
     @property
     def channel_count(self) -> int:

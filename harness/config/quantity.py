@@ -148,3 +148,27 @@ def _finite(number: float) -> bool:
 
 def _plain(number: float) -> str:
     return str(int(number)) if float(number).is_integer() else str(number)
+
+
+@dataclass(frozen=True)
+class CountOr(Rule):
+    """A whole number from 0 on, or a word that stands for no such number."""
+
+    word: str
+
+    def check(self, value: Any, context: Any) -> int | str:
+        """Return the number or the word."""
+        if value == self.word and isinstance(value, str):
+            return value
+        number = value if not isinstance(value, float) or not value.is_integer() else int(value)
+        if isinstance(number, bool) or not isinstance(number, int) or number < 0:
+            raise expected(self.describe(), value)
+        return number
+
+    def describe(self) -> str:
+        """Return what it may be."""
+        return f"an integer >= 0 or {self.word}"
+
+    def json_schema(self) -> dict[str, Any]:
+        """Return the schema of either."""
+        return {"anyOf": [Number("count", minimum=0).json_schema(), {"const": self.word}]}

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from freepath.config.base import Kind, OneOf
+from freepath.config.lights import LIGHTS
 from freepath.config.models import MAJORANTS, MEDIA
 from freepath.config.rays import RAYS
 from freepath.config.sweep import TRACKER, Config
@@ -15,7 +16,8 @@ DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 def json_schema(trackers: Mapping[str, type[Kind]]) -> dict[str, Any]:
     """Return the schema of configs that may use these trackers (parameter models by name)."""
-    kinds = {"medium": MEDIA, "majorant": MAJORANTS, "rays": RAYS, TRACKER: dict(trackers)}
+    kinds = {"medium": MEDIA, "majorant": MAJORANTS, "light": LIGHTS, "rays": RAYS}
+    kinds[TRACKER] = dict(trackers)
     schema = Config.model_json_schema()
     definitions = schema.pop("$defs", {})
     for word, models in kinds.items():

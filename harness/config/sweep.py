@@ -5,8 +5,9 @@ from typing import Annotated, Any
 
 from freepath.config.base import Kind, Model, OneOf
 from freepath.config.document import Document, Location, path_text
+from freepath.config.lights import LIGHTS, Uniform
 from freepath.config.models import MAJORANTS, MEDIA, Fraction, Global, Seed
-from freepath.config.quantity import Number
+from freepath.config.quantity import CountOr, Number
 from freepath.config.rays import RAYS, Orthographic
 from freepath.config.rules import Choice, OneOrMore, Text, expected
 from freepath.errors import Problem
@@ -18,7 +19,10 @@ from pydantic import (
     model_validator,
 )
 
-ESTIMANDS = ("transmittance", "free_path", "mean_extinction")
+ESTIMANDS = ("transmittance", "free_path", "radiance", "path_length", "mean_extinction")
+ALONG_PATHS = ("radiance", "path_length")
+"""Estimands of paths that scatter; the axes light to effects are only theirs."""
+UNLIMITED = "unlimited"
 LANES = ("auto", 1, 2, 4, 8, 16)
 ARITHMETIC = ("strict", "fast", "double")
 # the word under which the models of the trackers are handed to a validation as its context
@@ -31,11 +35,15 @@ Media = Annotated[tuple[Annotated[Kind, OneOf("medium", MEDIA)], ...], OneOrMore
 Majorants = Annotated[tuple[Annotated[Kind, OneOf("majorant", MAJORANTS)], ...], OneOrMore()]
 Tightnesses = Annotated[tuple[Annotated[float, Number(above=0)], ...], OneOrMore()]
 Trackers = Annotated[tuple[Annotated[Kind, OneOf(TRACKER)], ...], OneOrMore()]
+Lights = Annotated[tuple[Annotated[Kind, OneOf("light", LIGHTS)], ...], OneOrMore()]
+Scatterings = Annotated[tuple[Annotated[int | str, CountOr(UNLIMITED)], ...], OneOrMore()]
+Effects = Annotated[tuple[Annotated[str, Choice(("auto", "all"))], ...], OneOrMore()]
 Lanes = Annotated[tuple[Annotated[int | str, Choice(LANES)], ...], OneOrMore()]
 Arithmetics = Annotated[tuple[Annotated[str, Choice(ARITHMETIC)], ...], OneOrMore()]
 
 MediumPattern = Annotated[Kind, OneOf("medium", MEDIA, pattern=True)]
 MajorantPattern = Annotated[Kind, OneOf("majorant", MAJORANTS, pattern=True)]
+LightPattern = Annotated[Kind, OneOf("light", LIGHTS, pattern=True)]
 TrackerPattern = Annotated[Kind, OneOf(TRACKER, pattern=True)]
 
 
@@ -52,6 +60,14 @@ class Matrix(Model):
     """Factor on the majorant: 1 is tight, below 1 it no longer bounds."""
     tracker: Trackers
     """How distances are sampled or transmittance is estimated."""
+    light: Lights = (Uniform(),)
+    """What shines on the medium, of radiance."""
+    scatterings: Scatterings = (UNLIMITED,)
+    """How often a path may scatter, of radiance; unlimited ends it by Russian roulette."""
+    shadow: Trackers = Field(None)
+    """The tracker that estimates the transmittance towards a point light; ratio if left out."""
+    effects: Effects = ("auto",)
+    """auto compiles what the scene has; all compiles everything, for comparison."""
     lanes: Lanes = ("auto",)
     """Paths that a work-item follows at once; auto is the device's vector width."""
     arithmetic: Arithmetics = ("strict",)
@@ -87,6 +103,10 @@ class Include(Entry):
     majorant: Majorants = Field(None)
     tightness: Tightnesses = Field(None)
     tracker: Trackers = Field(None)
+    light: Lights = Field(None)
+    scatterings: Scatterings = Field(None)
+    shadow: Trackers = Field(None)
+    effects: Effects = Field(None)
     lanes: Lanes = Field(None)
     arithmetic: Arithmetics = Field(None)
 
@@ -102,6 +122,10 @@ class Exclude(Entry):
     majorant: Annotated[tuple[MajorantPattern, ...], OneOrMore()] = Field(None)
     tightness: Tightnesses = Field(None)
     tracker: Annotated[tuple[TrackerPattern, ...], OneOrMore()] = Field(None)
+    light: Annotated[tuple[LightPattern, ...], OneOrMore()] = Field(None)
+    scatterings: Scatterings = Field(None)
+    shadow: Annotated[tuple[TrackerPattern, ...], OneOrMore()] = Field(None)
+    effects: Effects = Field(None)
     lanes: Lanes = Field(None)
     arithmetic: Arithmetics = Field(None)
 

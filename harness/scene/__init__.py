@@ -3,7 +3,8 @@
 from freepath.scene.build import build_medium
 from freepath.scene.intersect import segments
 from freepath.scene.medium import Medium
+from freepath.scene.radiance import path_reference
 from freepath.scene.rays import make_rays
 from freepath.scene.references import reference
 
-__all__ = ["Medium", "build_medium", "make_rays", "reference", "segments"]
+__all__ = ["Medium", "build_medium", "make_rays", "path_reference", "reference", "segments"]

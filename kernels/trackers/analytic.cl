@@ -1,6 +1,6 @@
 /*---
 title: Analytic inversion of the CDF
-estimands: [transmittance, free_path]
+estimands: [transmittance, free_path, radiance, path_length]
 needs: [closed_form]
 channels: 1
 bounding: false

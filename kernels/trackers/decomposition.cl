@@ -1,6 +1,6 @@
 /*---
 title: Decomposition tracking
-estimands: [transmittance, free_path]
+estimands: [transmittance, free_path, radiance, path_length]
 needs: [majorant, control]
 bounding: true
 parameters:

@@ -1,6 +1,6 @@
 /*---
 title: Delta tracking
-estimands: [transmittance, free_path]
+estimands: [transmittance, free_path, radiance, path_length]
 needs: [majorant]
 channels: 1
 bounding: true

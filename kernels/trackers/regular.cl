@@ -1,6 +1,6 @@
 /*---
 title: Regular tracking
-estimands: [transmittance, free_path]
+estimands: [transmittance, free_path, radiance, path_length]
 needs: [cells]
 channels: 1
 bounding: false

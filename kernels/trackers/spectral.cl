@@ -1,6 +1,6 @@
 /*---
 title: Spectral tracking
-estimands: [transmittance, free_path]
+estimands: [transmittance, free_path, radiance, path_length]
 needs: [majorant]
 channels: any
 parameters:

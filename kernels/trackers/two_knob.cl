@@ -1,6 +1,6 @@
 /*---
 title: Null-collision tracking with free sampling rate and acceptance
-estimands: [transmittance, free_path]
+estimands: [transmittance, free_path, radiance, path_length]
 needs: [majorant]
 parameters:
   acceptance:

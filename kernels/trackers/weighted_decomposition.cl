@@ -1,6 +1,6 @@
 /*---
 title: Weighted decomposition tracking
-estimands: [transmittance, free_path]
+estimands: [transmittance, free_path, radiance, path_length]
 needs: [majorant, control]
 parameters:
   control:

@@ -1,8 +1,9 @@
 /*---
 title: Weighted delta tracking
-estimands: [transmittance, free_path]
+estimands: [transmittance, free_path, radiance, path_length]
 needs: [majorant]
 bounding: {probability: [analog]}
+single_flight: {probability: [no_absorption]}
 parameters:
   probability:
     choices: [analog, abs_null, no_absorption]

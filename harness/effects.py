@@ -1,0 +1,204 @@
+"""What paths that scatter add to a source: only the files of effects that the scene has."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from freepath import kernel_files
+from freepath.config.sweep import UNLIMITED
+from freepath.kernel_files import KernelFile
+
+MOST_SCATTERINGS = (1 << 24) - 1
+"""What `unlimited` is in a kernel, which counts in float; far above any path's steps."""
+ALL_CHANNELS = 3
+
+
+@dataclass(frozen=True)
+class Shadow:
+    """The tracker of shadow rays: its code, and what it declares."""
+
+    name: str
+    code: str
+    needs: frozenset[str]
+    numbers: tuple[str, ...]
+    choices: tuple[tuple[str, str, tuple[str, ...]], ...]
+    state: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True)
+class Effects:
+    """The effects of a scene along paths, named as `freepath list effects` does."""
+
+    names: tuple[str, ...]
+    channels: int
+    chromatic: bool
+    phase: str
+    length_only: bool
+    shadow: Shadow | None = None
+    values: Mapping[str, Mapping[str, Any]] = field(default_factory=dict, hash=False)
+    """{group: {field of the kernel's Numbers: value or list of values}}, in their order."""
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.names
+
+    @property
+    def groups(self) -> dict[str, tuple[str, ...]]:
+        """The fields of each group; those of a list are arrays."""
+        return {
+            group: tuple(
+                f"{name}[{len(v)}]" if isinstance(v, list) else name for name, v in f.items()
+            )
+            for group, f in self.values.items()
+        }
+
+    @property
+    def numbers(self) -> list[float]:
+        """All values, in the order in which `groups` declares them."""
+        return [
+            float(number)
+            for fields in self.values.values()
+            for value in fields.values()
+            for number in (value if isinstance(value, list) else [value])
+        ]
+
+    @property
+    def state(self) -> dict[str, str]:
+        """What a path carries for its effects."""
+        files = [kernel_files.read(name) for name in self._after]
+        return {name: kind for file in files for name, kind in file.state.items()}
+
+    def around(self, tracker: KernelFile, *, exact: bool) -> list[KernelFile]:
+        """The tracker's file with those of the effects before and behind it."""
+        before = ["effects/chromatic" if self.chromatic else "effects/grey"]
+        if "scattering" in self:
+            circle = "math/circle_builtin" if exact else "math/circle_polynomial"
+            before += [circle, f"phase/{self.phase}", "effects/direction"]
+            limited = "roulette" if "roulette" in self else "no_roulette"
+            before.append(f"effects/{limited}")
+        files = [kernel_files.read(name) for name in [*before, "effects/flight_names"]]
+        files.append(tracker)
+        if self.shadow:
+            files.append(kernel_files.read("effects/shadow_names"))
+            files.append(KernelFile(f"trackers/{self.shadow.name}.cl", self.shadow.code))
+        after = [kernel_files.read(name) for name in ("effects/own_names", *self._after)]
+        return [
+            *files,
+            *after,
+            KernelFile("hooks", self._hooks()),
+            kernel_files.read("effects/paths"),
+        ]
+
+    @property
+    def _after(self) -> list[str]:
+        order = ("length", "emission", "environment", "point_light", "scattering")
+        return [f"effects/{name}" for name in order if name in self]
+
+    def _hooks(self) -> str:
+        """What happens at the beginning of a path and at the end of a flight."""
+        at_end = ["collect_length(path, ended);"] if "length" in self else []
+        if "environment" in self:
+            at_end.append("see_environment(path, scene, ended & path->escaped);")
+        at_end += [
+            "const mask here = ended & ~path->escaped;",
+            "if (!any_lane(here))",
+            "    return;",
+        ]
+        calls = {
+            "emission": "emit(path, scene, here);",
+            "point_light": "light_directly(path, scene, rng, here);",
+            "scattering": "scatter(path, scene, rng, here);",
+        }
+        at_end += [call for name, call in calls.items() if name in self]
+        scatters = "scattering" in self
+        at_begin = ["    path->state.scatterings = (index)0;"] if scatters else []
+        over = ["    restore_ray(path, ended);"] if scatters else []
+        return "\n".join(
+            [
+                "static void path_begin(Path *path)",
+                "{",
+                *at_begin,
+                "}",
+                "",
+                "static void path_end(Path *path, const mask ended)",
+                "{",
+                *over,
+                "}",
+                "",
+                "static void at_end(Path *path, const Scene *scene, Rng *rng, const mask ended)",
+                "{",
+                *(f"    {line}" for line in at_end),
+                "}",
+            ]
+        )
+
+
+def of_scene(case: Any, medium: Any, shadow: Shadow | None, *, chromatic: bool) -> Effects:
+    """Derive the effects of a case in its medium.
+
+    `effects: all` has every effect that this scene could have, switched on with what adds nothing.
+    """
+    everything = case.effects == "all"
+    count = len(medium.channels)
+    model = case.medium
+    channels = ALL_CHANNELS if everything and count == 1 else count
+
+    def spread(given: tuple[float, ...]) -> list[float]:
+        return list(given) * channels if len(given) == 1 else list(given)
+
+    limit = MOST_SCATTERINGS if case.scatterings == UNLIMITED else case.scatterings
+    light = case.light
+    radiance = getattr(light, "radiance", None)
+    intensity = getattr(light, "intensity", None)
+    scatters = bool(any(model.albedo) and limit) or everything
+    length_only = case.estimand == "path_length"
+    names = ["length"] if length_only else []
+    optics: dict[str, Any] = {"albedo": spread(model.albedo)}
+    if not length_only and (any(model.emission) or everything):
+        names.append("emission")
+        optics["emission"] = spread(model.emission)
+    if not length_only and (radiance is not None or everything):
+        names.append("environment")
+        optics["environment"] = spread(radiance or (0.0,))
+    values: dict[str, Any] = {"optics": optics}
+    phase = (
+        "rod"
+        if model.phase == "rod"
+        else "henyey_greenstein"
+        if model.g or everything
+        else "isotropic"
+    )
+    if scatters:
+        optics["scatterings"] = limit
+        optics["g"] = model.g
+        values["space"] = _space(medium)
+        if not length_only and (intensity is not None or everything) and shadow:
+            names.append("point_light")
+            position = getattr(light, "position", (0.0, 0.0, 0.0))
+            place = medium.to_medium[:, :3] @ np.array(position) + medium.to_medium[:, 3]
+            values["light"] = dict(zip("xyz", place.tolist(), strict=True))
+            values["light"]["intensity"] = spread(intensity or (0.0,))
+        names.append("scattering")
+        if case.scatterings == UNLIMITED:
+            names.append("roulette")
+    lit = "point_light" in names
+    return Effects(
+        names=tuple(names),
+        channels=channels,
+        chromatic=chromatic or channels > 1,
+        phase=phase,
+        length_only=length_only,
+        shadow=shadow if lit else None,
+        values=values,
+    )
+
+
+def _space(medium: Any) -> dict[str, list[float]]:
+    """The linear maps between directions of the world and of the medium, row by row."""
+    linear = medium.to_medium[:, :3]
+    return {
+        "to_world": np.linalg.inv(linear).reshape(-1).tolist(),
+        "to_medium": linear.reshape(-1).tolist(),
+    }
