@@ -24,7 +24,7 @@ from freepath.errors import CatalogError, ConfigError, Problem
 from freepath.kernel_files import split_front_matter
 from pydantic import ValidationInfo, create_model, field_validator
 
-NEEDS = ("majorant", "control", "closed_form", "cells")
+NEEDS = ("majorant", "control", "closed_form", "cells", "light")
 ANY = "any"
 STATE = r"(real|mask|index)(\[[1-9][0-9]?\])?"
 """What a tracker may keep of a path: types that main.cl can merge under a mask, and arrays of them
@@ -124,6 +124,7 @@ class FrontMatter(Model):
         MAJORANTS
     )
     bounding: Annotated[bool | dict[str, tuple[Any, ...]], Bounding()] = False
+    escapes: Annotated[bool, Flag()] = True
     single_flight: Annotated[bool | dict[str, tuple[Any, ...]], Bounding()] = False
     unbiased: Annotated[bool, Flag()] = True
     parameters: dict[str, Parameter] = {}
@@ -161,6 +162,8 @@ class Tracker:
     majorants: tuple[str, ...]
     bounding: bool | dict[str, tuple[Any, ...]]
     """Whether it is only right where the majorant bounds; or for which choices of a parameter."""
+    escapes: bool
+    """Whether a flight may leave the medium: one that never does meets no environment."""
     single_flight: bool | dict[str, tuple[Any, ...]]
     """Whether, or for which choices, what it scores on its way is for no path that goes on."""
     unbiased: bool
@@ -250,6 +253,7 @@ def read(file: Path) -> Tracker:
         channels=front.channels,
         majorants=front.majorants,
         bounding=front.bounding,
+        escapes=front.escapes,
         single_flight=front.single_flight,
         unbiased=front.unbiased,
         parameters=front.parameters,

@@ -37,6 +37,8 @@ class Effects:
     chromatic: bool
     phase: str
     length_only: bool
+    near_light: bool = False
+    """Whether the tracker chooses distances with the light in mind."""
     shadow: Shadow | None = None
     values: Mapping[str, Mapping[str, Any]] = field(default_factory=dict, hash=False)
     """{group: {field of the kernel's Numbers: value or list of values}}, in their order."""
@@ -67,7 +69,8 @@ class Effects:
     @property
     def state(self) -> dict[str, str]:
         """What a path carries for its effects."""
-        files = [kernel_files.read(name) for name in self._after]
+        near = ["effects/near_light"] if self.near_light else []
+        files = [kernel_files.read(name) for name in [*near, *self._after]]
         return {name: kind for file in files for name, kind in file.state.items()}
 
     def around(self, tracker: KernelFile, *, exact: bool) -> list[KernelFile]:
@@ -76,6 +79,7 @@ class Effects:
         if "scattering" in self:
             circle = "math/circle_builtin" if exact else "math/circle_polynomial"
             before += [circle, f"phase/{self.phase}", "effects/direction"]
+            before += ["effects/near_light"] if self.near_light else []
             limited = "roulette" if "roulette" in self else "no_roulette"
             before.append(f"effects/{limited}")
         files = [kernel_files.read(name) for name in [*before, "effects/flight_names"]]
@@ -135,7 +139,9 @@ class Effects:
         )
 
 
-def of_scene(case: Any, medium: Any, shadow: Shadow | None, *, chromatic: bool) -> Effects:
+def of_scene(
+    case: Any, medium: Any, shadow: Shadow | None, *, chromatic: bool, near_light: bool
+) -> Effects:
     """Derive the effects of a case in its medium.
 
     `effects: all` has every effect that this scene could have, switched on with what adds nothing.
@@ -190,6 +196,7 @@ def of_scene(case: Any, medium: Any, shadow: Shadow | None, *, chromatic: bool) 
         chromatic=chromatic or channels > 1,
         phase=phase,
         length_only=length_only,
+        near_light=near_light,
         shadow=shadow if lit else None,
         values=values,
     )

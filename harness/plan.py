@@ -209,32 +209,38 @@ def _skip_reason(tracker: Tracker, point: Point) -> str:
     if tracker.channels not in (ANY, channels) and not alike:
         follows = f"{tracker.name} follows {_counted(tracker.channels)}"
         reasons.append(f"{follows}, and the medium has {channels}")
-    for need in sorted(tracker.needs - {"majorant", "control"} - point["medium"].OFFERS):
+    for need in sorted(tracker.needs - {"majorant", "control", "light"} - point["medium"].OFFERS):
         what = need.replace("_", " ")
         reasons.append(f"{tracker.name} needs {what}, which {point['medium'].kind} does not offer")
     return "; ".join(reasons)
 
 
 def _path_reason(tracker: Tracker, point: Point, catalog: Catalog) -> str:
-    """Why the shadow rays of a case cannot work; '' where they can, or where there are none."""
-    single, given = tracker.single_flight, point["tracker"].parameters()
-    if point["light"] and isinstance(single, dict):
-        for name, choices in single.items():
-            if given[name] in choices:
-                return f"{tracker.name} with {name} {given[name]} is for single flights"
-    if point["shadow"] is None:
+    """Why a case of paths that scatter cannot work; '' where it can, and for other estimands."""
+    light = point["light"]
+    if light is None:
         return ""
-    shadow = catalog.trackers[point["shadow"].kind]
-    reason = _skip_reason(shadow, point | {"estimand": "transmittance"})
-    if reason:
-        return f"shadow: {reason}"
-    if "control" in shadow.needs ^ tracker.needs:
-        return f"{tracker.name} and {shadow.name} of shadows need different walks"
-    if point["medium"].phase == "rod":
-        return "the rod model has no chance to scatter towards a point"
-    if shadow.name == tracker.name and point["shadow"] != point["tracker"]:
-        return f"{tracker.name} cannot have other parameters for shadows"
-    return ""
+    has_point, has_environment = hasattr(light, "intensity"), hasattr(light, "radiance")
+    single = tracker.single_flight if isinstance(tracker.single_flight, dict) else {}
+    given = point["tracker"].parameters()
+    alone = [name for name, choices in single.items() if given[name] in choices]
+    shadow = point["shadow"] and catalog.trackers[point["shadow"].kind]
+    reasons = {
+        f"{tracker.name} with this {''.join(alone)} is for single flights": bool(alone),
+        f"{tracker.name} needs a point light": "light" in tracker.needs and not has_point,
+        f"{tracker.name} never leaves the medium, and around it is light": not tracker.escapes
+        and has_environment,
+        "the rod model has no chance to scatter towards a point": shadow
+        and point["medium"].phase == "rod",
+    }
+    if shadow:
+        reason = _skip_reason(shadow, point | {"estimand": "transmittance"})
+        reasons[f"shadow: {reason}"] = bool(reason)
+        other_walk = "control" in shadow.needs ^ tracker.needs
+        reasons[f"{tracker.name} and {shadow.name} of shadows need different walks"] = other_walk
+        other = shadow.name == tracker.name and point["shadow"] != point["tracker"]
+        reasons[f"{tracker.name} cannot have other parameters for shadows"] = other
+    return "; ".join(reason for reason, holds in reasons.items() if holds)
 
 
 def _counted(channels: int | str) -> str:

@@ -227,7 +227,7 @@ def _state(structure: Structure, walks: list[KernelFile]) -> list[str]:
     return [*lines, "{", *merges, "}"]
 
 
-def numbers_of(
+def numbers_of(  # noqa: PLR0913, PLR0917 (one group of the kernel's Numbers each)
     structure: Structure,
     box: list[float],
     medium: dict[str, float],

@@ -109,7 +109,13 @@ def structure_of(
     chromatic = tracker.channels == ANY
     paths = None
     if case.light is not None:
-        paths = effects.of_scene(case, medium, _shadow(case, catalog), chromatic=chromatic)
+        paths = effects.of_scene(
+            case,
+            medium,
+            _shadow(case, catalog),
+            chromatic=chromatic,
+            near_light="light" in tracker.needs,
+        )
     needs = tracker.needs | (paths.shadow.needs if paths and paths.shadow else frozenset())
     return Structure(
         tracker=tracker.name,

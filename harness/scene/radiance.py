@@ -65,6 +65,8 @@ def _single_scattering(case: Any, medium: Medium, segments: Array) -> Array:
     to_light = np.array(case.light.position) - origins
     nearest = (to_light * ahead).sum(axis=1)
     off = np.linalg.norm(to_light - nearest[:, None] * ahead, axis=1)
+    # a light on the line of a ray but not on the ray: from beside, by what no integral can tell
+    off = np.maximum(off, 1e-7 * np.abs(nearest))
     low, high = np.arctan2(-nearest, off), np.arctan2(segments[:, 6] - nearest, off)
     nodes, weights = np.polynomial.legendre.leggauss(POINTS)
     result = np.zeros(len(segments))

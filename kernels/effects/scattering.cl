@@ -77,8 +77,8 @@ static void scatter(Path *path, const Scene *scene, Rng *rng, const mask here)
     path->majorant = choose(on, next.majorant, path->majorant);
     path->mean_free_path = choose(on, next.mean_free_path, path->mean_free_path);
     path->weight = choose(on, next.weight, path->weight);
-    path->lookups = next.lookups;
-    path->crossings = next.crossings;
+    path->lookups = choose(on, next.lookups, path->lookups);
+    path->crossings = choose(on, next.crossings, path->crossings);
     merge_state(&path->state, &next.state, on);
     path->live |= on;
 }

@@ -13,7 +13,7 @@ from freepath.catalog import Catalog, Tracker
 from freepath.device import Device, Program, scalar_type
 from freepath.plan import Case
 from freepath.runner import KernelData, Round, Runner
-from freepath.scene import Medium, build_medium, reference
+from freepath.scene import Medium, build_medium, path_reference, reference
 from freepath.scene import segments as inside
 from freepath.source import Source
 from freepath.sweep import Scene
@@ -73,6 +73,8 @@ class Flight:
 
     def reference(self) -> np.ndarray:
         """The exact value of each ray."""
+        if self.case.light is not None:
+            return path_reference(self.case, self.medium, self.segments)
         return reference(self.case.estimand, self.medium, self.segments)
 
     def run(self, samples: int, blocks: int = 1, **options: Any) -> Round:

@@ -1,0 +1,72 @@
+/*---
+title: Distances that are chosen with a light in mind
+state:
+  reach: real
+  density: real
+---*/
+/* Where a ray passes the point light, and the density of distances that the light sees under equal angles. */
+typedef struct {
+    real nearest;             /* distance along the ray at which it passes */
+    real off;                 /* how far beside the light that is */
+    real angle;               /* between the ray's two ends, seen from the light */
+} Pass;
+
+static Pass pass_light(const Path *path, const Scene *scene)
+{
+    const Vector to_light = in_world(scene, scene->light.x - path->origin_x, scene->light.y - path->origin_y,
+                                     scene->light.z - path->origin_z);
+    const Vector ahead = heading(path, scene);
+    Pass pass;
+    pass.nearest = to_light.x * ahead.x + to_light.y * ahead.y + to_light.z * ahead.z;
+    const real x = to_light.x - pass.nearest * ahead.x;
+    const real y = to_light.y - pass.nearest * ahead.y;
+    const real z = to_light.z - pass.nearest * ahead.z;
+    /* a lower bound, for a light on the ray: any density that is nowhere 0 is right */
+    const real off = sqrt(x * x + y * y + z * z);
+    const real least = (SCALAR)1e-3 * path->length + (SCALAR)1e-20;
+    pass.off = larger(off, least);
+    /* not the difference of two angles: far from the light both are nearly a right one */
+    const real both = pass.off * pass.off - pass.nearest * (path->length - pass.nearest);
+    pass.angle = atan2(path->length * pass.off, both);
+    return pass;
+}
+
+static real equiangular_distance(const Pass pass, const real u, const real length)
+{
+    const real angle = u * pass.angle;
+    const real square = pass.off * pass.off + pass.nearest * pass.nearest;
+    const real t = sin(angle) * square / (pass.off * cos(angle) + pass.nearest * sin(angle));
+    return clamp(t, (real)0, length);
+}
+
+static real equiangular_density(const Pass pass, const real t)
+{
+    const real along = t - pass.nearest;
+    return pass.off / (pass.angle * (pass.off * pass.off + along * along));
+}
+
+/* As next_tentative, on a ray that ends at `reach`. */
+static mask next_tentative_within(Path *path, const Scene *scene, Rng *rng, const real reach)
+{
+    const real whole = path->length;
+    path->length = reach;
+    const mask here = next_tentative(path, scene, rng);
+    path->length = whole;
+    return here;
+}
+
+/* One step of ratio tracking up to path->state.reach, a distance drawn with path->state.density; the flight ends
+   there, and the extinction there enters its weight. */
+static void step_to_reach(Path *path, const Scene *scene, Rng *rng)
+{
+    const mask before = path->live;
+    const mask here = next_tentative_within(path, scene, rng, path->state.reach);
+    const real sigma_n = path->majorant - sigma_t_at_tentative(path, scene, here);
+    path->weight = choose(here, path->weight * (sigma_n / path->majorant), path->weight);
+    const mask arrived = before & ~path->live;
+    if (any_lane(arrived)) {
+        const real density = sigma_t(path, scene, path->t, arrived) / path->state.density;
+        path->weight = choose(arrived, path->weight * density, path->weight);
+        path->escaped &= ~arrived;
+    }
+}
