@@ -38,6 +38,7 @@ class Structure:
     lanes: int
     arithmetic: str
     tracker_state: tuple[tuple[str, str], ...] = ()
+    tracker_uses: tuple[str, ...] = ()
     logarithm: str = "polynomial"
     count: bool = False
     record: bool = False
@@ -72,7 +73,7 @@ def compose(structure: Structure) -> Source:
     """Concatenate the files of a case, each behind a `#line` that names it to the compiler."""
     parts = [_defines(structure)]
     parts += _named(kernel_files.read(name) for name in _before_structs(structure))
-    walks = _with_uses(_walks(structure))
+    walks = _with_uses([*_walks(structure), *structure.tracker_uses])
     parts.append(_structs(structure, walks))
     middle = [f"estimands/{structure.estimand}", "count/on" if structure.count else "count/off"]
     middle += [f"medium/{structure.medium}", "lanes/path"]

@@ -101,6 +101,7 @@ def structure_of(
         needs=tracker.needs,
         tracker_numbers=tuple(name for name, p in parameters if p.choices is None),
         tracker_state=tuple(tracker.state.items()),
+        tracker_uses=tracker.uses,
         choices=tuple((n, str(case.params[n]), tuple(map(str, given))) for n, given in choices),
         estimand=case.estimand,
         medium=medium.kernel,
