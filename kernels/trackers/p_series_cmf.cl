@@ -17,8 +17,8 @@ citation: >-
   transmittance, section 5
 ---*/
 /* T = sum over k of p_k E[w_1 ... w_k], with the Poisson probabilities p_k of the majorant's optical depth and
-   w = 1 - sigma_t / majorant at random points, uniform in the majorant's optical depth. The same points serve all terms, so the first ones
-   are summed outright; what is beyond the mass continues with the probability p_k / p_(k-1). */
+   w = 1 - sigma_t / majorant at random points, uniform in that depth. The same points serve all terms, so the
+   first ones are summed outright; what is beyond the mass continues with the probability p_k / p_(k-1). */
 static void begin(Path *path, const Scene *scene, Rng *rng)
 {
     walk_begin(path, scene);
