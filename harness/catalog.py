@@ -26,6 +26,8 @@ from pydantic import ValidationInfo, create_model, field_validator
 
 NEEDS = ("majorant", "control", "closed_form", "cells", "light")
 ANY = "any"
+USES = ("math/newton", "math/symmetric_means")
+"""General mathematics in kernels/ that a tracker may have composed before it."""
 STATE = r"(real|mask|index)(\[[1-9][0-9]?\])?"
 """What a tracker may keep of a path: types that main.cl can merge under a mask, and arrays of them
 as scratch, which a sample fills before it reads them."""
@@ -128,6 +130,7 @@ class FrontMatter(Model):
     single_flight: Annotated[bool | dict[str, tuple[Any, ...]], Bounding()] = False
     unbiased: Annotated[bool, Flag()] = True
     parameters: dict[str, Parameter] = {}
+    uses: Annotated[tuple[Annotated[str, Choice(USES)], ...], OneOrMore(optional=True)] = ()
     state: dict[str, Annotated[str, Text("real, mask or index, or an array of them", STATE)]] = {}
     citation: Annotated[str, Text()] | None = None
 
@@ -170,6 +173,7 @@ class Tracker:
     parameters: dict[str, Parameter]
     state: dict[str, str]
     """Fields that a path carries for this tracker: their names and types."""
+    uses: tuple[str, ...]
     citation: str
     model: type[Kind] = field(repr=False)
 
@@ -258,6 +262,7 @@ def read(file: Path) -> Tracker:
         unbiased=front.unbiased,
         parameters=front.parameters,
         state=front.state,
+        uses=front.uses,
         citation=front.citation or "",
         model=_parameter_model(file.stem, front),
     )

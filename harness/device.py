@@ -201,6 +201,14 @@ class Program:
         self.time_build_s = time_build_s
         self._kernel = kernel
 
+    @property
+    def binary_bytes(self) -> int | None:
+        """Size of what the driver compiled; None where it does not tell."""
+        try:
+            return sum(self._kernel.program.binary_sizes) or None
+        except (cl.Error, AttributeError):
+            return None
+
     def launch(self, arguments: list, global_size: int, local_size: int) -> float:
         """Run the kernel to its end; returns event seconds (0 where the driver reports none)."""
         with run_errors(self.device.info.label, "a launch"):

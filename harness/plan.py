@@ -12,7 +12,8 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import Any
 
-from freepath.catalog import ANY, Catalog, Tracker
+from freepath.applicable import skip_reason
+from freepath.catalog import Catalog
 from freepath.config.base import Kind
 from freepath.config.sweep import ALONG_PATHS, AXES, Config, Exclude, Include, Stop
 from freepath.errors import ConfigError, NothingMatchedError, Problem
@@ -191,60 +192,9 @@ def _case(index: int, point: Point, config: Config, catalog: Catalog) -> Case:
         rays=config.rays,
         seed=config.seed,
         stop=config.stop,
-        skip_reason=_skip_reason(tracker, point) or _path_reason(tracker, point, catalog),
+        skip_reason=skip_reason(tracker, point, catalog),
         **{axis: point[axis] for axis in AXES if axis != "tracker"},
     )
-
-
-def _skip_reason(tracker: Tracker, point: Point) -> str:
-    reasons = []
-    if point["estimand"] not in tracker.estimands:
-        reasons.append(f"{tracker.name} does not estimate {point['estimand']}")
-    majorant = point["majorant"]
-    if majorant and majorant.kind not in tracker.majorants:
-        reasons.append(f"{tracker.name} does not work with a majorant {majorant.kind}")
-    channels = point["medium"].channel_count
-    factors = set(point["medium"].channels or ())
-    alike = point["light"] is not None and tracker.channels == 1 and factors <= {1.0}
-    if tracker.channels not in (ANY, channels) and not alike:
-        follows = f"{tracker.name} follows {_counted(tracker.channels)}"
-        reasons.append(f"{follows}, and the medium has {channels}")
-    for need in sorted(tracker.needs - {"majorant", "control", "light"} - point["medium"].OFFERS):
-        what = need.replace("_", " ")
-        reasons.append(f"{tracker.name} needs {what}, which {point['medium'].kind} does not offer")
-    return "; ".join(reasons)
-
-
-def _path_reason(tracker: Tracker, point: Point, catalog: Catalog) -> str:
-    """Why a case of paths that scatter cannot work; '' where it can, and for other estimands."""
-    light = point["light"]
-    if light is None:
-        return ""
-    has_point, has_environment = hasattr(light, "intensity"), hasattr(light, "radiance")
-    single = tracker.single_flight if isinstance(tracker.single_flight, dict) else {}
-    given = point["tracker"].parameters()
-    alone = [name for name, choices in single.items() if given[name] in choices]
-    shadow = point["shadow"] and catalog.trackers[point["shadow"].kind]
-    reasons = {
-        f"{tracker.name} with this {''.join(alone)} is for single flights": bool(alone),
-        f"{tracker.name} needs a point light": "light" in tracker.needs and not has_point,
-        f"{tracker.name} never leaves the medium, and around it is light": not tracker.escapes
-        and has_environment,
-        "the rod model has no chance to scatter towards a point": shadow
-        and point["medium"].phase == "rod",
-    }
-    if shadow:
-        reason = _skip_reason(shadow, point | {"estimand": "transmittance"})
-        reasons[f"shadow: {reason}"] = bool(reason)
-        other_walk = "control" in shadow.needs ^ tracker.needs
-        reasons[f"{tracker.name} and {shadow.name} of shadows need different walks"] = other_walk
-        other = shadow.name == tracker.name and point["shadow"] != point["tracker"]
-        reasons[f"{tracker.name} cannot have other parameters for shadows"] = other
-    return "; ".join(reason for reason, holds in reasons.items() if holds)
-
-
-def _counted(channels: int | str) -> str:
-    return "one channel" if channels == 1 else f"{channels} channels"
 
 
 def _name(point: Point) -> str:

@@ -20,10 +20,12 @@ COLUMNS = (
     "schema_version", "run_id", "case_id", "case", "status", "reason",
     "device", "platform", "driver_version",
     "tracker", "estimand", "medium", "channels", "majorant", "tightness", "effects",
+    "light", "scatterings", "shadow", "composition",
     "arithmetic", "lanes", "params", "seed", "rays", "samples_per_ray", "rounds", "stopped",
     "lookups_per_sample", "crossings_per_sample", "steps_per_sample", "lane_occupancy",
     "time_per_sample_s", "time_per_sample_cv", "time_noise", "timing_source",
-    "time_device_s", "time_wall_s", "device_time_share", "time_build_s", "lookups_per_s",
+    "time_device_s", "time_wall_s", "device_time_share", "time_build_s",
+    "source_bytes", "binary_bytes", "lookups_per_s",
     "estimate", "reference", "bias", "bias_stderr", "bias_rms", "z_score",
     "variance", "variance_noise", "rmse",
     "inv_efficiency_lookups", "inv_efficiency_s", "time_to_1pct_s",
@@ -37,7 +39,8 @@ SAMPLE_COLUMNS = (
 )
 TEXTS = frozenset((
     "run_id", "case_id", "case", "status", "reason", "device", "platform", "driver_version",
-    "tracker", "estimand", "medium", "majorant", "effects", "arithmetic", "params", "stopped",
+    "tracker", "estimand", "medium", "majorant", "effects", "light", "scatterings", "shadow",
+    "composition", "arithmetic", "params", "stopped",
     "timing_source", "source_sha256", "config_sha256",
 ))
 # fmt: on

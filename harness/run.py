@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from freepath import environment
+from freepath.binding import Scene
 from freepath.catalog import Catalog
 from freepath.config import Config
 from freepath.device import Device
@@ -21,7 +22,7 @@ from freepath.plan import Case
 from freepath.results import SCHEMA_VERSION, ResultFolder, key_of
 from freepath.scene import build_medium
 from freepath.source import BUILD_OPTIONS, combined_hash
-from freepath.sweep import Job, Scene, Sweep
+from freepath.sweep import Job, Sweep
 
 RESULTS = Path("results")
 STAMP = "%Y%m%d-%H%M%S"

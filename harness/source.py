@@ -44,6 +44,7 @@ class Structure:
     paths: Effects | None = None
     """What happens along paths that scatter; None where a sample is one flight."""
     tracker_state: tuple[tuple[str, str], ...] = ()
+    tracker_uses: tuple[str, ...] = ()
     logarithm: str = "polynomial"
     count: bool = False
     record: bool = False
@@ -78,7 +79,7 @@ def compose(structure: Structure) -> Source:
     """Concatenate the files of a case, each behind a `#line` that names it to the compiler."""
     parts = [_defines(structure)]
     parts += _named(kernel_files.read(name) for name in _before_structs(structure))
-    walks = _with_uses(_walks(structure))
+    walks = _with_uses([*_walks(structure), *structure.tracker_uses])
     channels = kernel_files.read(f"channels/{'several' if structure.chromatic else 'one'}")
     parts.append(_structs(structure, [*walks, channels]))
     middle = [f"estimands/{structure.estimand}", "count/on" if structure.count else "count/off"]

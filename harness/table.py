@@ -16,7 +16,8 @@ FAILED = ("invalid", "build_failed", "run_failed", "timeout", "crashed", "mismat
 LEGEND = (
     "time: device time a sample. occ.: lanes at work. rel. var.: variance of one sample over the\n"
     "squared reference. bias: of the reference, with its 95 % interval. to 1%: device time a ray\n"
-    "for a relative RMSE of 1 %; * the soonest, and what is not significantly later."
+    "for a relative RMSE of 1 %; * the soonest, and what is not significantly later. Without a\n"
+    "reference (?) the estimate stands in for it."
 )
 
 
@@ -51,6 +52,7 @@ def by_device(rows: Iterable[Row]) -> dict[str, list[Row]]:
 def group_key(row: Row) -> tuple[str, ...]:
     """Cases that answer the same question on the same device."""
     columns = ("device", "platform", "driver_version", "estimand", "medium", "rays")
+    columns += ("light", "scatterings")
     return tuple(row[column] for column in columns)
 
 
@@ -118,9 +120,14 @@ def bias(row: Row) -> str:
 
 def _method(row: Row) -> str:
     """Tracker, majorant and tightness."""
-    if row["majorant"] == "none":
-        return tracker_label(row)
-    return f"{tracker_label(row)} {row['majorant']} x{number(row, 'tightness'):g}"
+    parts = [tracker_label(row)]
+    if row["majorant"] != "none":
+        parts.append(f"{row['majorant']} x{number(row, 'tightness'):g}")
+    if row["shadow"] not in ("", "none"):
+        parts.append(f"shadow {row['shadow']}")
+    if row["composition"] == "all":
+        parts.append("all effects")
+    return " ".join(parts)
 
 
 def _cells(row: Row, *, best: bool) -> list[str]:
@@ -129,6 +136,7 @@ def _cells(row: Row, *, best: bool) -> list[str]:
         status = f"[bold red]{escape(row['status'])}[/]"
         return [escape(_method(row)), lanes, *[""] * 4, status, ""]
     variance, reference = number(row, "variance"), number(row, "reference")
+    reference = number(row, "estimate") if reference is None else reference
     return [
         escape(_method(row)),
         lanes,
@@ -141,12 +149,18 @@ def _cells(row: Row, *, best: bool) -> list[str]:
     ]
 
 
+def _bounces(row: Row) -> str:
+    count = row["scatterings"]
+    return f"{count} scattering" if count == "1" else f"{count} scatterings"
+
+
 def table_of(rows: list[Row]) -> Table:
     """A table of one group's rows; what reaches 1 % soonest is marked with a star."""
     first = rows[0]
     reference = next((short(number(row, "reference"), 4) for row in rows if row["reference"]), "?")
     rays = "1 ray" if first["rays"] == "1" else f"{first['rays']} rays"
-    title = f"{first['estimand']} of {first['medium']}, {rays}, reference {reference}"
+    lit = "" if first["light"] in ("", "none") else f" in {first['light']}, {_bounces(first)}"
+    title = f"{first['estimand']} of {first['medium']}{lit}, {rays}, reference {reference}"
     table = Table(title=escape(title), title_justify="left", title_style="bold", box=None)
     table.padding = (0, 1, 0, 0)
     table.add_column("tracker", overflow="fold")

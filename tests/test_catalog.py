@@ -34,6 +34,12 @@ def test_the_trackers_that_come_with_freepath():
     assert not trackers["march"].unbiased
 
 
+def test_a_tracker_reads_like_an_algorithm():
+    """Below 60 lines each, comments and blank lines among them, without the front matter."""
+    for tracker in catalog.load().trackers.values():
+        assert len(tracker.code.strip().split("\n")) < 60, tracker.name
+
+
 def test_everything_in_the_front_matter_is_read(tmp_path):
     front = """\
 estimands: [transmittance, free_path]
@@ -41,6 +47,7 @@ needs: [majorant, cells]
 channels: 3
 bounding: true
 unbiased: false
+uses: math/symmetric_means
 parameters:
   step: {unit: length, default: 2 cm, above: 0, meaning: length of a step}
   share: {unit: fraction, default: 50%, minimum: 0, maximum: 1}
@@ -59,6 +66,7 @@ citation: >-
     assert mine.needs == {"majorant", "cells"}
     assert (mine.channels, mine.bounding, mine.unbiased) == (3, True, False)
     assert mine.citation == "Someone 2014, Something, eq. 9"
+    assert mine.uses == ("math/symmetric_means",)
     assert mine.parameters["step"].unit == "length"
     assert mine.parameters["step"].meaning == "length of a step"
     assert mine.parameters["placement"].choices == ("start", "midpoint")
@@ -103,11 +111,17 @@ def test_parameter_models_check_what_a_config_gives(tmp_path):
 # (the front matter, from line 2 of the file on; line, column and text of the message)
 BAD_FRONT = [
     ("title: x\nestimands: []", 3, 12, "estimands: expected at least one value, got an empty list"),
-    ("title: x", 2, 1, "estimands: expected one of transmittance, free_path, mean_extinction, got"),
+    (
+        "title: x",
+        2,
+        1,
+        "estimands: expected one of transmittance, free_path, radiance, path_length, mean_extinction, got",
+    ),
     ("estimands: transmittance", 2, 1, "title: expected a text, got nothing"),
     ("title: 3\nestimands: transmittance", 2, 8, "title: expected a text, got 3"),
     ("title: x\nestimands: [radience]", 3, 13, "estimands[0]: expected one of transmittance"),
     ("{F}\nneeds: [majorants]", 4, 9, "got 'majorants'; did you mean 'majorant'?"),
+    ("{F}\nuses: [math/newtom]", 4, 8, "got 'math/newtom'; did you mean 'math/newton'?"),
     ("{F}\nneed: [majorant]", 4, 1, "need: unknown key; did you mean 'needs'?"),
     ("{F}\nchannels: 0", 4, 11, "channels: expected an integer >= 1, got 0"),
     ("{F}\nbounding: yes", 4, 11, "bounding: expected true, false or"),

@@ -262,6 +262,10 @@ def test_identity_is_canonical_json(expand):
                 "sigma_t": 200.0,
                 "floor": 0.0,
                 "channels": None,
+                "albedo": [0.0],
+                "emission": [0.0],
+                "phase": "henyey_greenstein",
+                "g": 0.0,
                 "interpolation": "trilinear",
                 "size": [1.0, 1.0, 1.0],
             }

@@ -2,7 +2,7 @@ import json
 
 import numpy as np
 import pytest
-from freepath import catalog, config, plan, source, sweep
+from freepath import binding, catalog, config, plan, source
 from freepath.measure import Bench
 from freepath.runner import LAUNCH_S, KernelData, Pace
 from freepath.scene import build_medium
@@ -50,11 +50,11 @@ def runner_of(device, tmp_path_factory):
         (folder / "x.yaml").write_text(json.dumps({"name": "x", "rays": rays, "matrix": matrix}))
         loaded = config.load(folder / "x.yaml", known.parameter_models())
         (case,) = plan.expand(loaded, known)
-        scene = sweep.Scene.of(case, build_medium(case.medium), [])
-        structure = sweep.structure_of(case, known, scene.medium, device, count=count)
+        scene = binding.Scene.of(case, build_medium(case.medium), [])
+        structure = binding.structure_of(case, known, scene.medium, device, count=count)
         program = device.build(source.compose(structure))
         data = KernelData.upload(device, scene.segments, scene.medium.data, case.arithmetic)
-        runner = sweep.runner_of(case, structure, scene, program, data)
+        runner = binding.runner_of(case, structure, scene, program, data)
         seconds, launch = [], program.launch
         program.launch = lambda *arguments: seconds.append(launch(*arguments)) or seconds[-1]
         return runner, seconds

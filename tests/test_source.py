@@ -94,6 +94,15 @@ def test_a_file_that_two_others_use_is_there_once_and_before_them():
     assert order.index("walk/dda.cl") < order.index("cells/grid_trilinear.cl")
 
 
+def test_what_a_tracker_uses_is_there_once_and_before_it():
+    files = files_of(composed(tracker_uses=("math/newton", "math/symmetric_means")))
+    assert files[-5] == "math/symmetric_means.cl"
+    # the walk uses that one too
+    by_newton = {"needs": frozenset({"closed_form"}), "medium": "cosine"}
+    files = files_of(composed(tracker_uses=("math/newton",), **by_newton))
+    assert files.count("math/newton.cl") == 1
+
+
 def test_lines_are_numbered_as_in_their_files():
     text = composed(needs=frozenset({"cells"}), medium="layered", medium_numbers=("layers",))
     name, line = "", 0

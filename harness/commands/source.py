@@ -31,7 +31,7 @@ def execute(options: Namespace) -> int:
     """Run it; returns the exit code."""
     loaded, known, cases = cases_of(options)
     case = _chosen(options, cases)
-    from freepath import run, source, sweep
+    from freepath import binding, run, source
     from freepath.device import open_devices
     from freepath.scene import build_medium
 
@@ -40,7 +40,7 @@ def execute(options: Namespace) -> int:
         return USAGE
     device = open_devices(options.device)[0]
     medium = build_medium(case.medium, run.search_path(loaded))
-    structure = sweep.structure_of(case, known, medium, device, count=False)
+    structure = binding.structure_of(case, known, medium, device, count=False)
     print(source.compose(structure).text)
     return 0
 

@@ -1,3 +1,10 @@
+/* A flight that may end at a collision with the control: the optical depth of the control at which it does. */
+static void target_control(Path *path, Rng *rng)
+{
+    Rng control_rng = companion(rng);
+    path->target = exponential(&control_rng);
+}
+
 /* The nearer of two independent exponential distances inside a span of constant coefficients: to the next
    tentative collision with the residual and to the collision with the control. FAR where neither happens. */
 static real to_residual(const Path *path, const real draw, const real span)

@@ -2,12 +2,10 @@
 title: Tentative collisions cell by cell
 uses: [walk/cell_by_cell]
 ---*/
-/* Every live lane goes on to its next tentative collision or leaves; returns those now at one. path->depth
-   is the majorant's optical depth flown. Lanes that are there wait for the others: in thin media that was
-   1.4 times as fast as one cell a step. */
-static mask next_tentative(Path *path, const Scene *scene, Rng *rng)
+/* Every live lane flies on through so much of the majorant's optical depth or leaves; returns those that are
+   there. They wait for the others: in thin media that was 1.4 times as fast as one cell a step. */
+static mask fly_through(Path *path, const Scene *scene, const real whole_draw)
 {
-    const real whole_draw = exponential(rng);
     real draw = whole_draw;
     mask walking = path->live;
     mask here = (mask)0;
@@ -30,6 +28,25 @@ static mask next_tentative(Path *path, const Scene *scene, Rng *rng)
     }
     path->depth = choose(here, path->depth + whole_draw, path->depth);
     return here;
+}
+
+/* Every live lane goes on to its next tentative collision or leaves; returns those now at one. path->depth
+   is the majorant's optical depth flown. */
+static mask next_tentative(Path *path, const Scene *scene, Rng *rng)
+{
+    return fly_through(path, scene, exponential(rng));
+}
+
+/* Live lanes are put where the majorant's optical depth from the start is `depth`, or at the end of the ray. */
+static void place_at_depth(Path *path, const Scene *scene, const real depth)
+{
+    Path probe = *path;
+    probe.t = (real)0;
+    walk_begin(&probe, scene);
+    fly_through(&probe, scene, depth);
+    path->t = choose(path->live, probe.t, path->t);
+    path->majorant = probe.majorant;
+    path->crossings = probe.crossings;
 }
 
 /* The majorant's optical depth of the whole ray, by a walk through all of its cells. */

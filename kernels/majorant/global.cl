@@ -9,7 +9,8 @@ static void walk_begin(Path *path, const Scene *scene)
 }
 
 /* Every live lane goes on to its next tentative collision or leaves; returns those now at one. path->depth
-   is the majorant's optical depth flown. A majorant of 0 leaves no optical depth that a draw could stay below, not even a draw of 0. */
+   is the majorant's optical depth flown. A majorant of 0 leaves no optical depth that a draw could stay below,
+   not even a draw of 0. */
 static mask next_tentative(Path *path, const Scene *scene, Rng *rng)
 {
     const real draw = exponential(rng);
@@ -18,6 +19,13 @@ static mask next_tentative(Path *path, const Scene *scene, Rng *rng)
     path->depth = choose(here, path->depth + draw, path->depth);
     escape(path, path->live & ~here);
     return here;
+}
+
+/* Live lanes are put where the majorant's optical depth from the start is `depth`, or at the end of the ray. */
+static void place_at_depth(Path *path, const Scene *scene, const real depth)
+{
+    const real t = depth * path->mean_free_path;
+    path->t = choose(path->live, smaller(t, path->length), path->t);
 }
 
 /* The majorant's optical depth of the whole ray. */

@@ -18,9 +18,8 @@ citation: Kutz, Habel, Li, Novak 2017, Spectral and decomposition tracking for r
    tracking; the nearer collision wins. One with the control takes no lookup. */
 static void begin(Path *path, const Scene *scene, Rng *rng)
 {
-    Rng control_rng = companion(rng);
-    path->target = exponential(&control_rng);
     walk_begin(path, scene);
+    target_control(path, rng);
 }
 
 static void step(Path *path, const Scene *scene, Rng *rng)

@@ -2,7 +2,6 @@
 title: p-series with cumulative mass function
 estimands: [transmittance]
 needs: [majorant]
-majorants: [global]
 parameters:
   mass:
     default: 0.99
@@ -18,8 +17,8 @@ citation: >-
   transmittance, section 5
 ---*/
 /* T = sum over k of p_k E[w_1 ... w_k], with the Poisson probabilities p_k of the majorant's optical depth and
-   w = 1 - sigma_t / majorant at uniformly random points. The same points serve all terms, so the first ones
-   are summed outright; what is beyond the mass continues with the probability p_k / p_(k-1). */
+   w = 1 - sigma_t / majorant at random points, uniform in that depth. The same points serve all terms, so the
+   first ones are summed outright; what is beyond the mass continues with the probability p_k / p_(k-1). */
 static void begin(Path *path, const Scene *scene, Rng *rng)
 {
     walk_begin(path, scene);
@@ -38,11 +37,12 @@ static void step(Path *path, const Scene *scene, Rng *rng)
     const real ratio = path->depth / order;
     const mask roulette = ~less(state->summed, (real)scene->tracker.mass);
     const mask stopped = path->live & ((roulette & ~less(uniform(rng), ratio)) | equal(ratio, (real)0));
-    path->t = uniform(rng) * path->length;
+    place_at_depth(path, scene, uniform(rng) * path->depth);
     escape(path, stopped);
     const mask here = path->live;
     const real sigma = sigma_t_at_tentative(path, scene, here);
-    const real null = (path->majorant - sigma) / path->majorant;
+    const mask empty = equal(path->majorant, (real)0); /* a last cell, by rounding */
+    const real null = choose(empty, (real)1, (path->majorant - sigma) / path->majorant);
     state->term = choose(here, state->term * null, state->term);
     /* Past the mode a survivor keeps the mass of its predecessor; the probability has paid for the rest. */
     const mask grows = here & (~roulette | less((real)1, ratio));

@@ -19,9 +19,8 @@ citation: >-
    with it. Real and null collisions are chosen in proportion to |residual| and |null|. */
 static void begin(Path *path, const Scene *scene, Rng *rng)
 {
-    Rng control_rng = companion(rng);
-    path->target = exponential(&control_rng);
     walk_begin(path, scene);
+    target_control(path, rng);
 }
 
 static void step(Path *path, const Scene *scene, Rng *rng)

@@ -15,6 +15,7 @@ VOXELS = 4.0 * RANDOM.random((CELLS,) * 3) * (RANDOM.random((CELLS,) * 3) > 0.5)
 
 # The grid's faces are also faces of voxels, so that a ray along one has nothing but ties.
 MAJORANTS = {"global": "global", "grid": {"grid": {"resolution": 4}}}
+MAJORANTS["octree"] = {"octree": {"resolution": 4}}
 TRACKERS = [("regular", "global"), *itertools.product(("delta", "ratio"), MAJORANTS)]
 ALPHA = sidak(1e-3, 2 * len(TRACKERS))
 
@@ -122,8 +123,8 @@ def test_one_voxel(rig, tracker, majorant, interpolation):
     origins = np.concatenate(
         [centre - 2.0 * directions, centre - 2.0 * directions + 0.2 * unit(offsets[1])]
     )
-    axes = {"tracker": tracker, "majorant": {"grid": {"resolution": 16}}, "lanes": 16}
-    axes["majorant"] = "global" if majorant == "global" else axes["majorant"]
+    finer = "global" if majorant == "global" else {majorant: {"resolution": 16}}
+    axes = {"tracker": tracker, "majorant": finer, "lanes": 16}
     flight = rig.flight(**axes, medium=medium, lines=(origins, np.tile(directions, (2, 1))))
     expected = flight.reference()
     assert (expected[:64] < 0.9).all()

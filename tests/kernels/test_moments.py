@@ -13,17 +13,24 @@ SAMPLES = 4096
 # a sample says little about the variance.
 THICKEST = 2.0
 
-CASES = list(itertools.product(("delta", "ratio"), MEDIA, MAJORANTS))
+CASES = list(itertools.product(("delta", "ratio"), MEDIA, MAJORANTS, (1.5,)))
+# Numbers do not change a kernel: these cost samples alone. Delta needs a bound.
+CASES += itertools.product(("delta", "ratio"), ("exponential",), ("grid",), (1, 1.25, 2, 4, 10))
+CASES += itertools.product(("ratio",), ("exponential",), ("grid",), (0.5, 0.8))
 # three checks of each case
 ALPHA = sidak(1e-3, 3 * len(CASES))
 
 
-@pytest.mark.parametrize(("tracker", "medium", "majorant"), CASES)
-def test_closed_forms(rig, tracker, medium, majorant):
+@pytest.mark.parametrize(("tracker", "medium", "majorant", "tightness"), CASES)
+def test_closed_forms(rig, tracker, medium, majorant, tightness):
     # lanes go round as in test_identities, for kernels that both can use
     turn = list(MEDIA).index(medium) + list(MAJORANTS).index(majorant)
     flight = rig.flight(
-        tracker=tracker, medium=medium, majorant=majorant, tightness=1.5, lanes=(16, 1)[turn % 2]
+        tracker=tracker,
+        medium=medium,
+        majorant=majorant,
+        tightness=tightness,
+        lanes=(16, 1)[turn % 2],
     )
     expected = EXPECTED[tracker](flight)
     depth = flight.medium.optical_depth(flight.segments)

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from freepath import config, plan, source, sweep
+from freepath import binding, config, plan, source
+from freepath.binding import Scene
 from freepath.catalog import Catalog, Tracker
 from freepath.device import Device, Program, scalar_type
 from freepath.plan import Case
@@ -16,7 +17,6 @@ from freepath.runner import KernelData, Round, Runner
 from freepath.scene import Medium, build_medium, path_reference, reference
 from freepath.scene import segments as inside
 from freepath.source import Source
-from freepath.sweep import Scene
 
 from support.media import CHORDS, MAJORANTS, MEDIA
 
@@ -147,14 +147,14 @@ class Rig:
             self._media[key] = build_medium(case.medium)
         medium = self._media[key]
         scene = Scene(medium, inside(*lines, medium)) if lines else Scene.of(case, medium, [])
-        structure = sweep.structure_of(
+        structure = binding.structure_of(
             case, self.catalog, medium, self.device, count=count, record=record
         )
         text = source.compose(structure)
         if change:
             text = Source(change.apply(text.text), text.options)
         data = KernelData.upload(self.device, scene.segments, medium.data, case.arithmetic)
-        runner = sweep.runner_of(case, structure, scene, self.program(text), data)
+        runner = binding.runner_of(case, structure, scene, self.program(text), data)
         read = scene.segments.astype(scalar_type(case.arithmetic)).astype(np.float64)
         return Flight(case, self.catalog.trackers[case.tracker], medium, read, runner, record)
 

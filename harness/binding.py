@@ -1,0 +1,174 @@
+"""From a case in its scene to the source that it is composed of, and to a runner."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from freepath import effects, majorants, source
+from freepath.catalog import ANY, Catalog
+from freepath.config.sweep import ALONG_PATHS
+from freepath.device import Device, Program, scalar_type
+from freepath.majorants import Majorant
+from freepath.plan import Case
+from freepath.runner import KernelData, Runner
+from freepath.scene import Medium, make_rays, path_reference, reference, segments
+from freepath.source import Structure
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A medium with the rays that fly through it; what is dear to derive from them is kept."""
+
+    medium: Medium
+    segments: np.ndarray
+    """(rays, 7), as scene.segments gives them."""
+    _kept: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
+
+    @classmethod
+    def of(cls, case: Case, medium: Medium, search_path: Iterable[str | Path]) -> Scene:
+        """Make the rays of a case in its medium."""
+        origins, directions = make_rays(case.rays, medium, case.seed, search_path)
+        return cls(medium, segments(origins, directions, medium))
+
+    def _keep(self, key: Any, make: Callable[[], Any]) -> Any:
+        if key not in self._kept:
+            self._kept[key] = make()
+        return self._kept[key]
+
+    @property
+    def fingerprint(self) -> str:
+        """Identifies the medium and the rays."""
+        return self._keep(
+            "fingerprint",
+            lambda: source.combined_hash(self.medium.fingerprint, self.segments.tobytes()),
+        )
+
+    def reference(self, case: Case) -> np.ndarray | None:
+        """The exact value of a case for each ray, (rays,) or (rays, channels); None without one."""
+        if case.light is None:
+            key = case.estimand
+            return self._keep(key, lambda: reference(key, self.medium, self.segments))
+        key = (case.estimand, case.light, case.scatterings)
+        return self._keep(key, lambda: path_reference(case, self.medium, self.segments))
+
+    def bounds(self, cells: tuple[int, int, int]) -> tuple[np.ndarray, np.ndarray]:
+        """The tightest minorant and majorant of each cell, [nz, ny, nx]."""
+        return self._keep(cells, lambda: self.medium.bounds(cells))
+
+    def majorant(self, case: Case, *, controlled: bool) -> Majorant:
+        """The majorant of a case, and the control that a controlled tracker splits off.
+
+        Without numbers for a tracker that uses none.
+        """
+        if case.majorant is None:
+            return Majorant({})
+        bounds = self.bounds(majorants.cells_of(case.majorant))
+        strongest = float(self.medium.channels.max())
+        if strongest != 1.0:
+            bounds = tuple(bound * strongest for bound in bounds)
+        control = case.params if controlled else None
+        return majorants.build(case.majorant, self.medium, bounds, case.tightness, control)
+
+    def largest_score(self, estimand: str) -> float:
+        """What no score exceeds while weights stay below 1, or below the number of channels."""
+        if estimand == "transmittance":
+            return float(len(self.medium.channels))
+        if estimand in ALONG_PATHS:
+            return math.inf
+        if estimand == "free_path":
+            return float(self.segments[:, 6].max()) * len(self.medium.channels)
+        return float(self.bounds((1, 1, 1))[1].max())
+
+
+def structure_of(
+    case: Case,
+    catalog: Catalog,
+    medium: Medium,
+    device: Device,
+    *,
+    count: bool,
+    record: bool = False,
+) -> Structure:
+    """Decide what the source of a case consists of."""
+    tracker = catalog.trackers[case.tracker]
+    parameters = [(name, p) for name, p in tracker.parameters.items() if not p.host]
+    choices = [(name, p.choices) for name, p in parameters if p.choices is not None]
+    majorant = case.majorant.kind if case.majorant else None
+    chromatic = tracker.channels == ANY
+    paths = None
+    if case.light is not None:
+        paths = effects.of_scene(
+            case,
+            medium,
+            _shadow(case, catalog),
+            chromatic=chromatic,
+            near_light="light" in tracker.needs,
+        )
+    needs = tracker.needs | (paths.shadow.needs if paths and paths.shadow else frozenset())
+    return Structure(
+        tracker=tracker.name,
+        tracker_code=tracker.code,
+        needs=needs,
+        tracker_numbers=tuple(name for name, p in parameters if p.choices is None),
+        tracker_state=tuple(tracker.state.items()),
+        tracker_uses=tracker.uses,
+        choices=tuple((n, str(case.params[n]), tuple(map(str, given))) for n, given in choices),
+        estimand=case.estimand,
+        medium=medium.kernel,
+        medium_numbers=tuple(medium.numbers),
+        majorant=majorant,
+        majorant_numbers=majorants.numbers_of(case.majorant, needs),
+        lanes=device.info.lanes if case.lanes == "auto" else int(case.lanes),
+        arithmetic=case.arithmetic,
+        channels=paths.channels if paths else len(medium.channels),
+        chromatic=paths.chromatic if paths else chromatic,
+        paths=paths,
+        logarithm=device.info.logarithm,
+        count=count,
+        record=record,
+    )
+
+
+def _shadow(case: Case, catalog: Catalog) -> effects.Shadow | None:
+    """The tracker of the shadow rays of a case."""
+    if case.shadow is None:
+        return None
+    tracker = catalog.trackers[case.shadow.kind]
+    given = case.shadow.parameters()
+    parameters = [(name, p) for name, p in tracker.parameters.items() if not p.host]
+    return effects.Shadow(
+        tracker.name,
+        tracker.code,
+        tracker.needs,
+        tuple(name for name, p in parameters if p.choices is None),
+        tuple((n, str(given[n]), tuple(map(str, p.choices))) for n, p in parameters if p.choices),
+        tuple(tracker.state.items()),
+    )
+
+
+def runner_of(
+    case: Case, structure: Structure, scene: Scene, program: Program, data: KernelData
+) -> Runner:
+    """Bind a built program to the numbers and the majorant of a case."""
+    controlled = "control" in structure.needs
+    medium, majorant = scene.medium, scene.majorant(case, controlled=controlled)
+    numbers = source.numbers_of(
+        structure,
+        medium.extent.tolist(),
+        medium.numbers,
+        majorant.numbers,
+        np.broadcast_to(medium.channels, structure.channels).tolist(),
+        dict(case.params),
+        case.shadow.parameters() if case.shadow else {},
+    )
+    # cases that share a majorant and a control share their buffer
+    control = tuple(sorted(case.params.items())) if controlled else None
+    buffer = data.keep((case.majorant, case.tightness, control), majorant.data)
+    uploaded = program.device.upload(np.array(numbers, scalar_type(case.arithmetic)))
+    fixed = case.arithmetic, structure.lanes, case.seed, structure.channels
+    return Runner(program, data, uploaded, buffer, *fixed)
