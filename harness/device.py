@@ -27,7 +27,7 @@ INTERPRETED = ("-cl-opt-disable", "-DBY_ELEMENT")
 """Oclgrind 21.10 lacks intrinsics that its own optimiser makes of rotations and copies, and takes
 one element of two added halves of 16 for uninitialised (docs/devices.md)."""
 LLVMPIPE_LOOPS = 65535
-"""Mesa 22.3 ends all loops of a work-item, without a word, after so many rounds of them together."""
+"""Mesa 22.3 silently ends all loops of a work-item after so many rounds of them together."""
 LLVMPIPE_GROUP = 8
 """llvmpipe follows so many work-items of a group in step; smaller groups leave it idle."""
 NO_DEVICE = "no OpenCL device found; `pip install 'freepath[pocl]'` brings one that runs on the CPU"

@@ -35,7 +35,7 @@ def in_icd_files(library: str) -> str:
             named = file.read_text("utf-8", "replace").strip()
         except OSError:
             continue
-        # a bare name is for the dynamic linker to find; Intel's wheel names a path that is not there
+        # a bare name is for the linker to find; Intel's wheel names a path that is not there
         if library in named and ("/" not in named or Path(named).exists()):
             return named
     return ""
@@ -141,6 +141,7 @@ DRIVERS = (
         prefix=("oclgrind", "--uninitialized", "--data-races"),
     ),
 )
+TimeoutExpired = subprocess.TimeoutExpired
 BY_NAME = {driver.name: driver for driver in (*DRIVERS, OTHERS)}
 
 
@@ -167,9 +168,9 @@ def is_in_view(platform: str, version: str) -> bool:
     driver = current()
     if driver is None:
         return True
-    return (
-        owner(platform, version) is OTHERS if driver is OTHERS else driver.owns(platform, version)
-    )
+    if driver is OTHERS:
+        return owner(platform, version) is OTHERS
+    return driver.owns(platform, version)
 
 
 def environment_of(driver: Driver, folder: Path) -> dict[str, str]:

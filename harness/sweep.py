@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from freepath import majorants, source
 from freepath.catalog import Catalog
-from freepath.device import Device, Program, scalar_type
-from freepath.errors import BuildError, FreepathError, RunError
+from freepath.device import Device, DeviceInfo, Program, scalar_type
+from freepath.errors import BuildError, DriverLimitError, FreepathError, RunError
 from freepath.majorants import Majorant
 from freepath.measure import Bench, interleave
 from freepath.plan import Case
@@ -23,6 +23,8 @@ from freepath.source import Source, Structure
 from freepath.stopping import Rule
 
 REASON_LENGTH = 300
+INTERPRETED_RAYS, INTERPRETED_SAMPLES = 16, 4
+"""The most rays, and samples of each, that a device gets which interprets kernels to check them."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +46,13 @@ class Scene:
         if key not in self._kept:
             self._kept[key] = make()
         return self._kept[key]
+
+    def for_device(self, info: DeviceInfo) -> Scene:
+        """The same, with but a few rays, evenly chosen, where a device interprets kernels."""
+        if not info.interpreted or len(self.segments) <= INTERPRETED_RAYS:
+            return self
+        chosen = np.linspace(0, len(self.segments) - 1, INTERPRETED_RAYS).round().astype(int)
+        return self._keep("few rays", lambda: Scene(self.medium, self.segments[chosen]))
 
     @property
     def fingerprint(self) -> str:
@@ -220,7 +229,10 @@ class Sweep:
             runner_of(case, job.structure, scene, program, data[case.arithmetic])
             for program in programs
         )
-        rule = Rule(stop.error, stop.time_noise, stop.at_most, stop.samples)
+        samples = stop.samples
+        if self.device.info.interpreted:
+            samples = min(samples or INTERPRETED_SAMPLES, INTERPRETED_SAMPLES)
+        rule = Rule(stop.error, stop.time_noise, stop.at_most, samples)
         bench = Bench(timed, counting, rule)
         bench.prepare()
         self._add_build(job, bench.measurement.time_compile_s)
@@ -273,6 +285,8 @@ class Sweep:
     def _fail(self, job: Job, error: FreepathError) -> None:
         """A case that cannot be built or run is a row; the others go on."""
         status = "build_failed" if isinstance(error, BuildError) else "run_failed"
+        if isinstance(error, DriverLimitError):
+            status = "skipped"
         self._finish(job, job.row | {"status": status, "reason": first_error(error)})
 
     def _finish(self, job: Job, row: dict[str, Any], rounds: Iterable[dict[str, Any]] = ()) -> None:

@@ -20,7 +20,7 @@ ORDER = (
     ("stopping",),
     ("drivers",),
     ("device",),
-    ("loop_limit",),
+    ("loop_limit", "selection"),
     ("runner",),
     ("measure",),
     ("results",),
