@@ -193,16 +193,17 @@ def in_process_of(
     driver: Driver,
     arguments: Sequence[str],
     *,
+    module: str = "freepath",
     capture: bool = False,
     timeout: float | None = None,
 ) -> subprocess.CompletedProcess[str]:
-    """Run `freepath ARGUMENTS` where only this driver's devices are seen.
+    """Run `freepath ARGUMENTS`, or another module of Python, where only this driver is seen.
 
     What it prints is passed through, or captured as stdout and stderr. An interruption of this
     process is handed on, and waits until the other has left everything in order. Raises
     subprocess.TimeoutExpired after so many seconds.
     """
-    command = [*driver.prefix, sys.executable, "-m", "freepath", *arguments]
+    command = [*driver.prefix, sys.executable, "-m", module, *arguments]
     streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE} if capture else {}
     sys.stdout.flush()
     with (

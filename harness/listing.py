@@ -104,20 +104,20 @@ def devices(infos: Iterable[DeviceInfo], driver: str) -> list[Record]:
             "double": info.fp64,
             "timer resolution [ns]": round(info.timer_resolution_s * 1e9),
             "timing source": info.timing_source,
-            "remarks": _remarks(info),
+            "remarks": remarks(info),
         }
         for info in infos
     ]
 
 
-def _remarks(info: DeviceInfo) -> list[str]:
+def remarks(info: DeviceInfo) -> list[str]:
     """What is to be known of a device beside its numbers."""
-    remarks = []
+    found = []
     if info.interpreted:
-        remarks.append("interprets kernels and checks every access: few rays, few samples")
+        found.append("interprets kernels and checks every access: few rays, few samples")
     if info.loop_limit:
-        remarks.append(f"ends the loops of a work-item after {info.loop_limit} rounds")
-    return remarks
+        found.append(f"ends the loops of a work-item after {info.loop_limit} rounds")
+    return found
 
 
 def not_there(name: str, title: str, missing: str) -> Record:

@@ -26,7 +26,7 @@ ORDER = (
     ("results",),
     ("rows", "table"),
     ("sweep", "report"),
-    ("run", "arguments"),
+    ("run", "arguments", "device_setup"),
     ("commands",),
     ("cli",),
     ("__main__",),
