@@ -46,16 +46,15 @@ def made_by(tmp_path_factory):
 def test_samples_are_the_same_on_each(made_by, name, tracker):
     """Nothing is built wrong, read or written where it must not be, or computed otherwise."""
     flights, others = made_by(name)["flights"], made_by("pocl-wheel")["flights"]
-    cases = [axes for axes in map(name_of, chosen_cases()) if axes.split("-")[0] == tracker]
-    assert len(cases) == 2
-    for case in cases:
-        mine, other = flights[case], others[case]
-        assert not isinstance(other, str), other
-        assert not isinstance(mine, str), mine
-        same = mine["lookups"] == other["lookups"]
-        assert same.mean() > 1 - RARE, case
-        close = np.isclose(mine["score"], other["score"], rtol=1e-3, atol=1e-5)
-        assert close.mean() > 1 - RARE, case
+    (case,) = [axes for axes in map(name_of, chosen_cases()) if axes.split("-")[0] == tracker]
+    mine, other = flights[case], others[case]
+    assert not isinstance(other, str), other
+    assert not isinstance(mine, str), mine
+    close = np.isclose(mine["score"], other["score"], rtol=1e-3, atol=1e-5)
+    assert close.mean() > 1 - RARE, case
+    # a ray through a voxel's edge may cross a cell more or less
+    difference = np.abs(mine["lookups"] - other["lookups"])
+    assert (difference <= (2 if tracker == "regular" else 0)).mean() > 1 - RARE, case
 
 
 @pytest.mark.parametrize("name", NAMES)
