@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pyopencl as cl
-from freepath import loop_limit
+from freepath import limits
 from freepath.device import COUNTERS, Device, Program, scalar_type
 from freepath.stats import Moments, merge_blocks
 
@@ -162,7 +162,7 @@ class Runner:
         In launches that stay short, unless it is said how many. Sample numbers start at
         first_sample; each sample is the same however it is blocked and cut.
         """
-        parts = loop_limit.parts_of(samples, self._device.info)
+        parts = limits.parts_of(samples, self._device.info)
         samples, blocks = samples // parts, blocks * parts
         units = self.rays * blocks
         work_items = work_items or self._device.work_items
@@ -174,7 +174,7 @@ class Runner:
             numbers = range(first_sample, first_sample + samples)
             seconds = self._launch(numbers, first, end, outputs, work_items)
             taken = int(self._read("taken", outputs, (1,), np.uint32)[0])
-            if not loop_limit.check(taken, end, lanes, end - first, self._device.info):
+            if not limits.check(taken, end, lanes, end - first, self._device.info):
                 self._pace.failed((end - first) * samples)
                 launches = None
                 continue
@@ -187,7 +187,7 @@ class Runner:
         recorded = None
         if record:
             recorded = self._read("recorded", outputs, (units, samples, 5), self._scalar)
-            recorded = loop_limit.joined(recorded, self.rays, parts)
+            recorded = limits.joined(recorded, self.rays, parts)
         return Round(
             samples=units * samples,
             estimate=float(moments.mean.mean()),

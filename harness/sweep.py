@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from freepath import majorants, source
+from freepath import limits, majorants, source
 from freepath.catalog import Catalog
 from freepath.device import Device, DeviceInfo, Program, scalar_type
 from freepath.errors import BuildError, DriverLimitError, FreepathError, RunError
@@ -23,8 +23,6 @@ from freepath.source import Source, Structure
 from freepath.stopping import Rule
 
 REASON_LENGTH = 300
-INTERPRETED_RAYS, INTERPRETED_SAMPLES = 16, 4
-"""The most rays, and samples of each, that a device gets which interprets kernels to check them."""
 
 
 @dataclass(frozen=True)
@@ -49,10 +47,8 @@ class Scene:
 
     def for_device(self, info: DeviceInfo) -> Scene:
         """The same, with but a few rays, evenly chosen, where a device interprets kernels."""
-        if not info.interpreted or len(self.segments) <= INTERPRETED_RAYS:
-            return self
-        chosen = np.linspace(0, len(self.segments) - 1, INTERPRETED_RAYS).round().astype(int)
-        return self._keep("few rays", lambda: Scene(self.medium, self.segments[chosen]))
+        few = limits.rays_of(self.segments, info)
+        return self if few is self.segments else self._keep("few", lambda: Scene(self.medium, few))
 
     @property
     def fingerprint(self) -> str:
@@ -229,9 +225,7 @@ class Sweep:
             runner_of(case, job.structure, scene, program, data[case.arithmetic])
             for program in programs
         )
-        samples = stop.samples
-        if self.device.info.interpreted:
-            samples = min(samples or INTERPRETED_SAMPLES, INTERPRETED_SAMPLES)
+        samples = limits.samples_of(stop.samples, self.device.info)
         rule = Rule(stop.error, stop.time_noise, stop.at_most, samples)
         bench = Bench(timed, counting, rule)
         bench.prepare()

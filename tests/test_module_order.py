@@ -20,7 +20,7 @@ ORDER = (
     ("stopping",),
     ("drivers",),
     ("device",),
-    ("loop_limit", "selection"),
+    ("limits", "selection"),
     ("runner",),
     ("measure",),
     ("results",),

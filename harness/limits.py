@@ -1,7 +1,9 @@
-"""Work cut so small that a driver which ends loops early ends none of ours, and proof that it did.
+"""Work made so small that a device of which little can be asked gets through it.
 
-Every lane ends by taking the number of a unit that is not there. If fewer numbers were taken than
-units and lanes together, some work-item was stopped before, and what it worked on is lost.
+An interpreter is slow: it gets few rays and few samples. A driver that ends loops early gets units
+so small that it ends none of ours, and what it did is proven to be all: every lane ends by taking
+the number of a unit that is not there, so if fewer numbers were taken than units and lanes
+together, some work-item was stopped before, and what it worked on is lost.
 """
 
 from __future__ import annotations
@@ -10,9 +12,26 @@ import numpy as np
 from freepath.device import DeviceInfo
 from freepath.errors import DriverLimitError
 
+INTERPRETED_RAYS, INTERPRETED_SAMPLES = 16, 4
+"""The most rays, and samples of each, that a device gets which interprets kernels to check them."""
 SAMPLES_OF_A_UNIT = 1
-"""No more on a device that limits loops: a lane works on a unit at least, and a single sample of
-unbiased ray marching may take a tenth of what llvmpipe allows."""
+"""No more on a device that limits loops: a lane works on a unit at least, and eight samples of
+unbiased ray marching were too many for llvmpipe."""
+
+
+def rays_of(segments: np.ndarray, info: DeviceInfo) -> np.ndarray:
+    """The segments (rays, 7) that a device gets: all, or of an interpreter few, evenly chosen."""
+    if not info.interpreted or len(segments) <= INTERPRETED_RAYS:
+        return segments
+    chosen = np.linspace(0, len(segments) - 1, INTERPRETED_RAYS).round().astype(int)
+    return segments[chosen]
+
+
+def samples_of(samples: int | None, info: DeviceInfo) -> int | None:
+    """How many samples of each ray a case takes, None if as many as precision asks for."""
+    if not info.interpreted:
+        return samples
+    return min(samples or INTERPRETED_SAMPLES, INTERPRETED_SAMPLES)
 
 
 def parts_of(samples: int, info: DeviceInfo) -> int:
