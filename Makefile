@@ -1,16 +1,22 @@
 # make sweep   sets everything up in .venv and runs the first sweep
 # make test    sets up what the tests need and runs them all
+# make devices installs further OpenCL drivers for the CPU, as far as that is possible here
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: sweep test lint schema clean
+.PHONY: sweep test devices lint schema clean
 
 sweep: $(VENV)/installed
 	$(BIN)/freepath run quick
 
 test: $(VENV)/installed-for-tests
 	$(BIN)/python -m pytest -n auto --dist loadfile
+
+# OpenCL drivers that need no special hardware: by apt where this is root, and by pip. What cannot be
+# had is said, and the others are installed all the same.
+devices: $(VENV)/installed
+	$(BIN)/python -m freepath.device_setup
 
 lint: $(VENV)/installed-for-tests
 	$(BIN)/ruff check harness tests

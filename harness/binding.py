@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from freepath import effects, majorants, source
+from freepath import effects, limits, majorants, source
 from freepath.catalog import ANY, Catalog
 from freepath.config.sweep import ALONG_PATHS
-from freepath.device import Device, Program, scalar_type
+from freepath.device import Device, DeviceInfo, Program, scalar_type
 from freepath.majorants import Majorant
 from freepath.plan import Case
 from freepath.runner import KernelData, Runner
@@ -39,6 +39,11 @@ class Scene:
         if key not in self._kept:
             self._kept[key] = make()
         return self._kept[key]
+
+    def for_device(self, info: DeviceInfo) -> Scene:
+        """The same, with but a few rays, evenly chosen, where a device interprets kernels."""
+        few = limits.rays_of(self.segments, info)
+        return self if few is self.segments else self._keep("few", lambda: Scene(self.medium, few))
 
     @property
     def fingerprint(self) -> str:

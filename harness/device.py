@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
+from freepath import drivers
 from freepath.errors import BuildError, DeviceError, RunError
 from freepath.source import SCALARS, Source
 
@@ -20,7 +21,15 @@ os.environ.setdefault("PYOPENCL_NO_CACHE", "1")
 import pyopencl as cl  # noqa: E402  (the cache is chosen before the import)
 
 COUNTERS = ("lookups", "crossings", "violations", "steps", "truncated", "nonfinite")
+COMPLAINT_LENGTH = 600
 LANE_COUNTS = (1, 2, 4, 8, 16)
+INTERPRETED = ("-cl-opt-disable", "-DBY_ELEMENT")
+"""Oclgrind 21.10 lacks intrinsics that its own optimiser makes of rotations and copies, and takes
+one element of two added halves of 16 for uninitialised (docs/devices.md)."""
+LLVMPIPE_LOOPS = 65535
+"""Mesa 22.3 silently ends all loops of a work-item after so many rounds of them together."""
+LLVMPIPE_GROUP = 8
+"""llvmpipe follows so many work-items of a group in step; smaller groups leave it idle."""
 NO_DEVICE = "no OpenCL device found; `pip install 'freepath[pocl]'` brings one that runs on the CPU"
 
 
@@ -41,11 +50,20 @@ class DeviceInfo:
     logarithm: str
     slow_compiler: bool
     """Whether a kernel that is run once is better built without optimisation."""
+    interpreted: bool = False
+    """Whether it interprets kernels to check them: then it gets few rays and few samples."""
+    loop_limit: int = 0
+    """After how many rounds of its loops a driver ends a work-item; 0 where it does not."""
 
     @property
     def label(self) -> str:
         """One line for messages."""
         return f"{self.name} ({self.platform} {self.driver_version})"
+
+    @property
+    def timing_source(self) -> str:
+        """`device` where events tell the time, `wall` where the driver says that they do not."""
+        return "device" if self.timer_resolution_s > 0.0 else "wall"
 
 
 def _info(device: cl.Device, number: int = 1) -> DeviceInfo:
@@ -54,6 +72,7 @@ def _info(device: cl.Device, number: int = 1) -> DeviceInfo:
     platform = " ".join(device.platform.name.split())
     pocl = "portable computing language" in platform.lower()
     name = " ".join(device.name.split())
+    llvmpipe = platform == "rusticl" and name.startswith("llvmpipe")
     return DeviceInfo(
         name=name if number == 1 else f"{name} #{number}",
         platform=platform,
@@ -66,6 +85,8 @@ def _info(device: cl.Device, number: int = 1) -> DeviceInfo:
         # Measured on PoCL: the polynomial runs 16 lanes at up to 1.7 times the built-in's speed.
         logarithm="polynomial" if pocl else "builtin",
         slow_compiler=pocl,
+        interpreted=platform == "Oclgrind",
+        loop_limit=LLVMPIPE_LOOPS if llvmpipe else 0,
     )
 
 
@@ -83,6 +104,8 @@ def _all_devices() -> list[tuple[cl.Device, DeviceInfo]]:
             continue
         for device in devices:
             first = _info(device)
+            if not drivers.is_in_view(first.platform, first.driver_version):
+                continue
             alike = sum(
                 other.platform == first.platform and other.name.partition(" #")[0] == first.name
                 for _, other in found
@@ -138,6 +161,7 @@ class Device:
     def __init__(self, device: cl.Device, info: DeviceInfo):
         self.info = info
         self._device = device
+        self._complaints = drivers.Complaints()
         profiling = cl.command_queue_properties.PROFILING_ENABLE
         try:
             self.context = cl.Context([device])
@@ -148,6 +172,8 @@ class Device:
     @property
     def work_items(self) -> tuple[int, int]:
         """Global and local size: the loop is persistent, so a few work-items a core suffice."""
+        if self.info.loop_limit:
+            return LLVMPIPE_GROUP * self.info.compute_units, LLVMPIPE_GROUP
         if self.info.kind == "CPU":
             return 4 * self.info.compute_units, 1
         local = min(64, self._device.max_work_group_size)
@@ -182,6 +208,8 @@ class Device:
     def build(self, source: Source) -> Program:
         """Compile; raises BuildError with the compiler's log."""
         started = time.perf_counter()
+        if self.info.interpreted:
+            source = Source(source.text, (*source.options, *INTERPRETED))
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", cl.CompilerWarning)
@@ -190,6 +218,13 @@ class Device:
         except cl.Error as error:
             raise BuildError(f"{self.info.label} cannot build the kernel:\n{error}") from error
         return Program(self, kernel, source, time.perf_counter() - started)
+
+    def check_complaints(self) -> None:
+        """Raise RunError where an interpreter has found something wrong since it was last asked."""
+        found = self._complaints.new()
+        if found:
+            text = "; ".join(drivers.report_lines(found))
+            raise RunError(f"{self.info.label}: {text[:COMPLAINT_LENGTH]}")
 
 
 class Program:
@@ -216,6 +251,9 @@ class Program:
             size = (global_size,), (local_size,)
             event = cl.enqueue_nd_range_kernel(self.device.queue, self._kernel, *size)
             event.wait()
+        self.device.check_complaints()
+        if self.device.info.timing_source == "wall":
+            return 0.0  # rusticl 22.3 has no timer and may report a nanosecond
         try:
             return max(0, event.profile.end - event.profile.start) * 1e-9
         except cl.Error:

@@ -90,3 +90,7 @@ class RunError(FreepathError):
     """A launch that failed on the device."""
 
     exit_code = FAILED
+
+
+class DriverLimitError(RunError):
+    """A launch that a driver ended early, by a limit that it has; no fault of the kernel."""

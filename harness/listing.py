@@ -97,11 +97,12 @@ def configs() -> list[Record]:
     return records
 
 
-def devices(infos: Iterable[DeviceInfo]) -> list[Record]:
-    """One record a device."""
+def devices(infos: Iterable[DeviceInfo], driver: str) -> list[Record]:
+    """One record a device of a driver."""
     return [
         {
             "device": info.name,
+            "-d": driver,
             "platform": info.platform,
             "driver": info.driver_version,
             "kind": info.kind,
@@ -109,9 +110,26 @@ def devices(infos: Iterable[DeviceInfo]) -> list[Record]:
             "lanes": info.lanes,
             "double": info.fp64,
             "timer resolution [ns]": round(info.timer_resolution_s * 1e9),
+            "timing source": info.timing_source,
+            "remarks": remarks(info),
         }
         for info in infos
     ]
+
+
+def remarks(info: DeviceInfo) -> list[str]:
+    """What is to be known of a device beside its numbers."""
+    found = []
+    if info.interpreted:
+        found.append("interprets kernels and checks every access: few rays, few samples")
+    if info.loop_limit:
+        found.append(f"ends the loops of a work-item after {info.loop_limit} rounds")
+    return found
+
+
+def not_there(name: str, title: str, missing: str) -> Record:
+    """The record of a driver without a device."""
+    return {"device": title, "-d": name, "missing": missing}
 
 
 def records_of(what: str, catalog: Catalog) -> list[Record]:

@@ -143,13 +143,14 @@ class Run:
         return Sweep(device, self.catalog, self.folder, self.run_id, self._done, self._progress)
 
     def _plan(self, sweep: Sweep, scenes: dict[str, Scene]) -> list[Job]:
-        return [sweep.plan(case, scenes[scene_key(case)]) for case in self.cases]
+        info = sweep.device.info
+        return [sweep.plan(case, scenes[scene_key(case)].for_device(info)) for case in self.cases]
 
     def _run(self, sweep: Sweep, scenes: dict[str, Scene], jobs: list[Job]) -> None:
         try:
             for key, scene in scenes.items():
                 group = [job for job in jobs if scene_key(job.case) == key]
-                sweep.run(scene, group, self.config.seed)
+                sweep.run(scene.for_device(sweep.device.info), group, self.config.seed)
         finally:
             self.clock.build_s += sweep.time_build_s
 
@@ -188,7 +189,18 @@ class Run:
         }
 
     def _write(self, facts: dict[str, Any], session: dict[str, Any]) -> None:
-        sessions = self.folder.read_run().get("sessions")
+        before = self.folder.read_run()
+        sessions = before.get("sessions")
         earlier = sessions if isinstance(sessions, list) else []
         others = [s for s in earlier if isinstance(s, dict) and s.get("run_id") != self.run_id]
-        self.folder.write_run(facts | {"sessions": [*others, session]})
+        merged = {name: _with_others(before, facts, name) for name in ("devices", "cases")}
+        self.folder.write_run(facts | merged | {"sessions": [*others, session]})
+
+
+def _with_others(before: dict[str, Any], now: dict[str, Any], name: str) -> list[dict[str, Any]]:
+    """A list of run.json, with what it held before of devices that this run has not."""
+    labels = {device["name"] for device in now["devices"]}
+    key = "name" if name == "devices" else "device"
+    old = before.get(name)
+    kept = [one for one in old or [] if isinstance(one, dict) and one.get(key) not in labels]
+    return [*kept, *now[name]]

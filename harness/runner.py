@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pyopencl as cl
+from freepath import limits
 from freepath.device import COUNTERS, Device, Program, scalar_type
 from freepath.stats import Moments, merge_blocks
 
@@ -15,6 +16,8 @@ STEP_CAP = 1 << 20
 """Steps after which a path is cut off and counted as truncated."""
 SAMPLES_PER_UNIT = (1 << 31) // STEP_CAP - 1
 """So that the 32-bit counters of a unit cannot overflow even if every path reaches the cap."""
+MOST_SAMPLES_OF_A_LAUNCH = 1 << 62
+"""No limit, until a driver shows one."""
 LAUNCH_S = 0.25
 """Device time below which a launch should stay. What is longer is cut into launches of half of it,
 as some rays take longer than others."""
@@ -91,11 +94,12 @@ class Pace:
 
     def __init__(self, first: int):
         self._most = first
+        self._limit = MOST_SAMPLES_OF_A_LAUNCH
         self._seconds_per_sample = 0.0
 
     def fit(self, left: int) -> int:
         """Samples for the next launch, of so many that are left."""
-        pace = self._seconds_per_sample
+        pace, left = self._seconds_per_sample, min(left, self._limit)
         if left <= self._most and left * pace <= LAUNCH_S:
             return left
         return min(left, self._most, int(LAUNCH_S / 2 / pace) if pace else left)
@@ -104,6 +108,10 @@ class Pace:
         """Learn from a launch; the next may be four times as large, however quick this one was."""
         self._most = max(self._most, 4 * samples)
         self._seconds_per_sample = seconds / samples
+
+    def failed(self, samples: int) -> None:
+        """Learn from a launch that did not come to its end: half of it is the most from now on."""
+        self._limit = samples // 2
 
 
 @dataclass
@@ -165,14 +173,23 @@ class Runner:
         In launches that stay short, unless it is said how many. Sample numbers start at
         first_sample; each sample is the same however it is blocked and cut.
         """
+        parts = limits.parts_of(samples, self._device.info)
+        samples, blocks = samples // parts, blocks * parts
         units = self.rays * blocks
         work_items = work_items or self._device.work_items
+        lanes = work_items[0] * self.lanes
         outputs = self._outputs(units, work_items[0], samples if record else 0)
         time_device, iterations, first, started = 0.0, 0, 0, time.perf_counter()
         while first < units:
             end = first + self._units_of_a_launch(units - first, units, samples, launches)
             numbers = range(first_sample, first_sample + samples)
-            time_device += self._launch(numbers, first, end, outputs, work_items)
+            seconds = self._launch(numbers, first, end, outputs, work_items)
+            taken = int(self._read("taken", outputs, (1,), np.uint32)[0])
+            if not limits.check(taken, end, lanes, end - first, self._device.info):
+                self._pace.failed((end - first) * samples)
+                launches = None
+                continue
+            time_device += seconds
             iterations += int(self._read("iterations", outputs, (work_items[0],), np.uint64).sum())
             first = end
         time_wall = time.perf_counter() - started
@@ -183,6 +200,7 @@ class Runner:
             recorded = self._read(
                 "recorded", outputs, (units, samples, self._recorded), self._scalar
             )
+            recorded = limits.joined(recorded, self.rays, parts)
         return Round(
             samples=units * samples,
             estimate=float(moments.mean.mean()),

@@ -6,11 +6,11 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
-from freepath import majorants, source
+from freepath import limits, majorants, source
 from freepath.binding import Scene, runner_of, structure_of
 from freepath.catalog import Catalog
 from freepath.device import Device, Program
-from freepath.errors import BuildError, FreepathError, RunError
+from freepath.errors import BuildError, DriverLimitError, FreepathError, RunError
 from freepath.measure import Bench, interleave
 from freepath.plan import Case
 from freepath.results import ResultFolder
@@ -112,7 +112,8 @@ class Sweep:
             runner_of(case, job.structure, scene, program, data[case.arithmetic])
             for program in programs
         )
-        rule = Rule(stop.error, stop.time_noise, stop.at_most, stop.samples)
+        samples = limits.samples_of(stop.samples, self.device.info)
+        rule = Rule(stop.error, stop.time_noise, stop.at_most, samples)
         bench = Bench(timed, counting, rule)
         bench.prepare()
         self._add_build(job, bench.measurement.time_compile_s)
@@ -168,6 +169,8 @@ class Sweep:
     def _fail(self, job: Job, error: FreepathError) -> None:
         """A case that cannot be built or run is a row; the others go on."""
         status = "build_failed" if isinstance(error, BuildError) else "run_failed"
+        if isinstance(error, DriverLimitError):
+            status = "skipped"
         self._finish(job, job.row | {"status": status, "reason": first_error(error)})
 
     def _finish(self, job: Job, row: dict[str, Any], rounds: Iterable[dict[str, Any]] = ()) -> None:

@@ -115,7 +115,7 @@ BAD_FRONT = [
         "title: x",
         2,
         1,
-        "estimands: expected one of transmittance, free_path, radiance, path_length, mean_extinction, got",
+        "estimands: expected one of transmittance, free_path, radiance, path_length",
     ),
     ("estimands: transmittance", 2, 1, "title: expected a text, got nothing"),
     ("title: 3\nestimands: transmittance", 2, 8, "title: expected a text, got 3"),

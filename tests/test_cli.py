@@ -8,7 +8,7 @@ import sys
 import time
 
 import pytest
-from freepath import cli
+from freepath import cli, drivers
 from freepath import device as devices
 from freepath.commands.listing import LISTS
 from freepath.results import read_rows
@@ -135,6 +135,7 @@ def test_nothing_matched(call):
 
 def test_no_opencl_at_all(call, monkeypatch):
     monkeypatch.setattr(devices.cl, "get_platforms", list)
+    monkeypatch.setattr(drivers, "DRIVERS", ())
     code, out, err = call("run", "small.yaml")
     assert (code, out) == (2, "")
     assert "pip install 'freepath[pocl]'" in err
@@ -166,7 +167,15 @@ def test_cases_as_json(call):
     (case,) = json.loads(out)
     assert case["name"] == "transmittance/homogeneous-1/regular/auto/strict"
     assert case["medium"] == {
-        "homogeneous": {"channels": None, "sigma_t": 1.0, "size": [1.0, 1.0, 1.0]}
+        "homogeneous": {
+            "channels": None,
+            "albedo": [0.0],
+            "emission": [0.0],
+            "phase": "henyey_greenstein",
+            "g": 0.0,
+            "sigma_t": 1.0,
+            "size": [1.0, 1.0, 1.0],
+        }
     }
 
 
@@ -250,6 +259,29 @@ def test_devices(call, device):
     assert "lanes: 16" in out or device.info.lanes != 16
     records = json.loads(call("devices", "--json")[1])
     assert device.info.name in [record["device"] for record in records]
+    assert {record["-d"] for record in records} >= {driver.name for driver in drivers.DRIVERS}
+    for driver in drivers.DRIVERS:
+        shown = [record for record in records if record["-d"] == driver.name]
+        assert [record.get("missing") for record in shown] == [driver.missing or None]
+
+
+def test_a_run_on_all_devices_has_rows_and_a_table_of_each(call, work):
+    """Each in its own process, into one folder."""
+    code, out, err = call("run", "small.yaml", "-R", "regular", "-d", "all", "-o", "out")
+    assert code == 0, err
+    rows = read_rows(work / "out" / "summary.csv")
+    there = drivers.installed()
+    owners = [drivers.owner(row["platform"], row["driver_version"]) for row in rows]
+    assert owners[: len(there)] == there
+    assert {row["status"] for row in rows} == {"ok"}
+    assert out.count("transmittance of homogeneous") == len(rows)
+    facts = json.loads((work / "out" / "run.json").read_text())
+    assert len(facts["devices"]) == len(facts["cases"]) == len(facts["sessions"]) == len(rows)
+    few = {row["platform"]: row["rays"] for row in rows}
+    assert few.get("Oclgrind", "16") == "16"
+    code, out, err = call("run", "small.yaml", "-R", "regular", "-d", "all", "-o", "out")
+    assert code == 2
+    assert "already holds" in err
 
 
 def test_the_source_of_a_case(call, selector):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import sys
 import time
@@ -18,7 +19,9 @@ from freepath.errors import FAILED, INTERRUPTED
 
 if TYPE_CHECKING:
     from freepath.plan import Case
+    from freepath.results import ResultFolder
     from freepath.run import Run
+    from freepath.selection import Parts
     from rich.console import Console
 
 
@@ -32,7 +35,11 @@ def add(commands: Any) -> None:
         allow_abbrev=False,
     )
     add_config(run)
-    add_device(run, "part of the name, platform or driver of a device, or 'all'; may be repeated")
+    add_device(
+        run,
+        "part of the name, platform or driver of a device, a name that `freepath devices` shows "
+        "behind -d, or 'all'; may be repeated",
+    )
     run.add_argument("-N", "--show-only", action="store_true", help="list the cases and stop")
     run.add_argument(
         "-o",
@@ -48,6 +55,8 @@ def add(commands: Any) -> None:
         "source, device and driver are unchanged are kept",
     )
     run.add_argument("--json", action="store_true", help="print the rows as JSON, nothing else")
+    # given to the process of a driver: who started it shows the rows of all
+    run.add_argument("--rows-only", action="store_true", help=argparse.SUPPRESS)
 
 
 def execute(options: Namespace) -> int:
@@ -56,30 +65,81 @@ def execute(options: Namespace) -> int:
     loaded, known, cases = cases_of(options)
     if options.show_only:
         return _show_only(options, cases)
-    from freepath import environment, run
+    from freepath import environment, run, selection
     from freepath.device import open_devices
-    from freepath.results import ResultFolder, records
+    from freepath.results import ResultFolder
 
     load = environment.load()
-    devices = open_devices(options.device)
+    parts = selection.processes_of(options.device)
+    devices = [] if parts else open_devices(options.device)
     path = options.output or (run.newest_folder if options.resume else run.new_folder)(loaded.name)
-    folder, clock = ResultFolder(path, resume=options.resume), run.Clock(started)
+    folder = ResultFolder(path, resume=options.resume)
+    if parts:
+        crashed = _run_in_processes(options, parts, folder)
+        return max(_show(options, folder, cases, load), FAILED if crashed else 0)
     console = console_of(stderr=options.json)
     with _shown_progress(console) as (on_done, on_progress):
+        clock = run.Clock(started)
         sweep = run.Run(loaded, known, cases, folder, clock, on_done, on_progress)
         try:
             sweep.execute(devices)
         except KeyboardInterrupt:
             _say_how_to_resume(sweep)
             return INTERRUPTED
+    if options.rows_only:
+        return 0
+    return _show(options, folder, cases, load, sweep)
+
+
+def _run_in_processes(options: Namespace, parts: Parts, folder: ResultFolder) -> bool:
+    """Run each driver's devices in its process, one after the other, into one folder.
+
+    Tells whether one of them crashed or could not do what was wanted; the others still run.
+    """
+    from freepath import drivers
+    from freepath.results import SUMMARY
+
+    failed = False
+    for driver, selectors in parts:
+        arguments = ["run", options.config, "-o", str(folder.folder), "--rows-only"]
+        if options.resume or (folder.folder / SUMMARY).exists():
+            arguments.append("--resume")
+        arguments += ["--json"] * options.json
+        for flag, values in (("-d", selectors), ("-a", options.axis), ("-R", [options.include])):
+            arguments += [word for value in values if value is not None for word in (flag, value)]
+        arguments += ["-E", options.exclude] * (options.exclude is not None)
+        arguments += [word for one in options.trackers for word in ("--trackers", str(one))]
+        if not options.json:
+            print(f"{driver.name}: {driver.title}")
+        code = drivers.in_process_of(driver, arguments).returncode
+        if code == INTERRUPTED:
+            raise KeyboardInterrupt
+        if code < 0:
+            print(f"freepath: {drivers.how_it_ended(driver, code)}", file=sys.stderr)
+        failed |= code != 0
+    return failed
+
+
+def _show(
+    options: Namespace,
+    folder: ResultFolder,
+    cases: list[Case],
+    load: float,
+    sweep: Run | None = None,
+) -> int:
+    """Print what the folder holds, and what failed; returns the exit code."""
+    from freepath.results import records
+
     rows = _in_order(folder.rows(), cases)
     if options.json:
         print(json.dumps(records(rows), indent=1))
-    else:
-        _print_tables(console, rows, load)
+        return _say_failures(rows)
+    console = console_of()
+    _print_tables(console, rows, load)
+    if sweep:
         _print_times(console, sweep)
-        for written in folder.paths():
-            console.print(f"wrote {written}", highlight=False, markup=False, soft_wrap=True)
+    for written in folder.paths():
+        console.print(f"wrote {written}", highlight=False, markup=False, soft_wrap=True)
     return _say_failures(rows)
 
 

@@ -24,8 +24,9 @@ static bits next_bits(Rng *rng)
    vectors, while PoCL calls mul_hi element by element. */
 static bits high_word(const bits x, const uint m) { return to_bits((to_wide(x) * (ulong)m) >> 32); }
 
-static Rng philox(Rng c, uint key0, uint key1)
+static Rng philox(const Rng counter, uint key0, uint key1)
 {
+    Rng c = counter; /* rusticl 22.3 passes the caller's own struct: changing a parameter would change it */
     for (int round = 0; round < 10; ++round) {
         const Rng before = c;
         c.s0 = high_word(before.s2, 0xCD9E8D57u) ^ before.s1 ^ key0;

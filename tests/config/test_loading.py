@@ -103,6 +103,10 @@ def test_every_kind_loads_and_loads_again_from_what_it_holds(load_text, small_ca
         "sigma_t": pytest.approx(5e-4),
         "size": (2000.0, 2000.0, 2000.0),
         "channels": None,
+        "albedo": (0.0,),
+        "emission": (0.0,),
+        "phase": "henyey_greenstein",
+        "g": 0.0,
     }
     assert media[7].breakpoints == (0.5,)
     assert media[10].voxel_size == (20.0, 20.0, 40.0)
@@ -205,7 +209,7 @@ BAD_MATRIX = [
     ),
     ("medium: {cloud: {resolution: 8, channels: [1, -1]}}", 4, 49, "a number >= 0, got -1"),
     ("medium: {cloud: {resolution: 8, channels: red}}", 4, 45, "got 'red'"),
-    ("medium: {cloud: [1]}", 4, 19, "expected a mapping with resolution, channels, seed"),
+    ("medium: {cloud: [1]}", 4, 19, "expected a mapping with resolution, channels, albedo"),
     ("medium: [[cloud]]", 4, 12, "matrix.medium[0]: expected a medium (one of"),
     ("medium: {cloud: {resolution: 1}}", 4, 32, "expected an integer from 2 to 1024, got 1"),
     ("medium: {cloud: {resolution: 8.5}}", 4, 32, "expected an integer from 2 to 1024, got 8.5"),

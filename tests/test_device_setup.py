@@ -1,0 +1,53 @@
+import os
+import sys
+
+import pytest
+from freepath import device_setup, drivers
+from freepath.device_setup import command_of, install, obstacle
+from freepath.drivers import Driver
+
+
+def made_up(get, found=""):
+    return Driver("made-up", "A driver", "Maker", (get,), lambda: found)
+
+
+def test_commands():
+    assert command_of("pip install a b")[:4] == [sys.executable, "-m", "pip", "install"]
+    assert command_of("apt-get install c") == ["apt-get", "install", "-y", "-qq", "c"]
+
+
+def test_what_cannot_be_tried_says_why(monkeypatch):
+    monkeypatch.setattr(os, "geteuid", lambda: 1000)
+    monkeypatch.setattr(device_setup.shutil, "which", lambda name: f"/usr/bin/{name}")
+    assert obstacle("apt-get install c") == "apt-get needs root"
+    assert obstacle("pip install a") == ""
+    monkeypatch.setattr(device_setup.shutil, "which", lambda name: None)
+    assert obstacle("apt-get install c") == "there is no apt-get here"
+
+
+def test_what_fails_says_why(monkeypatch):
+    quick = [sys.executable, "-c"]
+    assert device_setup.run([*quick, "pass"]) == ""
+    assert device_setup.run([*quick, "print('a'); print('E: no such package'); exit(1)"]) == (
+        "E: no such package"
+    )
+    assert device_setup.run([*quick, "exit(3)"]) == "exit code 3"
+    assert "no-such-program" in device_setup.run(["no-such-program"])
+    monkeypatch.setattr(device_setup, "run", lambda command: "no network")
+    assert install(made_up("pip install a")) == "`pip install a`: no network"
+    monkeypatch.setattr(device_setup, "run", lambda command: "")
+    assert install(made_up("pip install a")) == "was installed and is still not found"
+    assert install(made_up("pip install a", found="there")) == ""
+
+
+@pytest.mark.parametrize("works", [True, False])
+def test_what_is_missing_is_said_and_the_others_are_still_there(monkeypatch, capsys, device, works):
+    missing = made_up("pip install a")
+    monkeypatch.setattr(drivers, "DRIVERS", (missing, made_up("pip install b", found="there")))
+    shown = [[device.info] if works else [], [device.info]]
+    monkeypatch.setattr(device_setup, "probe", lambda wanted: shown)
+    monkeypatch.setattr(device_setup, "run", lambda command: "no network")
+    assert device_setup.main() == (0 if works else 8)
+    out, err = capsys.readouterr()
+    assert out.count(device.info.label) == (2 if works else 1)
+    assert ("MISSING: `pip install a`: no network" in err) != works
