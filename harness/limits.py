@@ -43,7 +43,7 @@ def parts_of(samples: int, info: DeviceInfo) -> int:
 
 
 def joined(recorded: np.ndarray, rays: int, parts: int) -> np.ndarray:
-    """What `parts` units of a ray recorded, (blocks x parts x rays, samples, values), as one unit's."""
+    """What `parts` units of a ray recorded, (blocks x parts x rays, samples, n), as one unit's."""
     if parts == 1:
         return recorded
     samples, width = recorded.shape[1:]

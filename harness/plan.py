@@ -107,7 +107,7 @@ def expand(config: Config, catalog: Catalog) -> list[Case]:
     (unless axes are overridden) and for too many cases, NothingMatchedError if none is left.
     """
     matrix = {axis: getattr(config.matrix, axis) for axis in AXES}
-    if matrix["shadow"] is None:
+    if not matrix["shadow"]:
         default = catalog.trackers.get(SHADOW)
         matrix["shadow"] = (default.model() if default else None,)
     _refuse_too_many(config, matrix)

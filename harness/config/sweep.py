@@ -36,6 +36,7 @@ Majorants = Annotated[tuple[Annotated[Kind, OneOf("majorant", MAJORANTS)], ...],
 Tightnesses = Annotated[tuple[Annotated[float, Number(above=0)], ...], OneOrMore()]
 Trackers = Annotated[tuple[Annotated[Kind, OneOf(TRACKER)], ...], OneOrMore()]
 Lights = Annotated[tuple[Annotated[Kind, OneOf("light", LIGHTS)], ...], OneOrMore()]
+Shadows = Annotated[tuple[Annotated[Kind, OneOf(TRACKER)], ...], OneOrMore(optional=True)]
 Scatterings = Annotated[tuple[Annotated[int | str, CountOr(UNLIMITED)], ...], OneOrMore()]
 Effects = Annotated[tuple[Annotated[str, Choice(("auto", "all"))], ...], OneOrMore()]
 Lanes = Annotated[tuple[Annotated[int | str, Choice(LANES)], ...], OneOrMore()]
@@ -64,7 +65,7 @@ class Matrix(Model):
     """What shines on the medium, of radiance."""
     scatterings: Scatterings = (UNLIMITED,)
     """How often a path may scatter, of radiance; unlimited ends it by Russian roulette."""
-    shadow: Trackers = Field(None)
+    shadow: Shadows = ()
     """The tracker that estimates the transmittance towards a point light; ratio if left out."""
     effects: Effects = ("auto",)
     """auto compiles what the scene has; all compiles everything, for comparison."""
