@@ -25,6 +25,7 @@ ORDER = (
     ("rows", "table"),
     ("sweep", "report"),
     ("run", "arguments"),
+    ("check",),
     ("commands",),
     ("cli",),
     ("__main__",),

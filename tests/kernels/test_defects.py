@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from support import cases
-from support.identities import (
+from freepath.check import cases
+from freepath.check.identities import (
     check_clean,
     check_count,
     check_mean,
@@ -19,67 +19,67 @@ from support.identities import (
     check_same_samples,
     check_variance,
 )
-from support.rig import Change
-from support.truth import MajorantAlongRays
+from freepath.check.rig import Change
+from freepath.check.truth import MajorantAlongRays
 
 ALPHA = 1e-4
 
 
-def whole(rig, change, **axes):
+def whole(rig, **axes):
     """All that is checked of any tracker."""
-    cases.check_case(rig, axes, ALPHA, change=change)
+    cases.check_case(rig, axes, ALPHA)
 
 
-def distribution(rig, change, **axes):
-    flight = rig.flight(**axes, change=change)
+def distribution(rig, **axes):
+    flight = rig.flight(**axes)
     cases.check_distribution(flight, flight.record(256), ALPHA)
 
 
-def cleanness(rig, change, **axes):
-    check_clean(rig.flight(**axes, change=change).run(2), bounded=True)
+def cleanness(rig, **axes):
+    check_clean(rig.flight(**axes).run(2), bounded=True)
 
 
-def variance(rig, change, **axes):
-    flight = rig.flight(**axes, change=change)
+def variance(rig, **axes):
+    flight = rig.flight(**axes)
     depth = flight.medium.optical_depth(flight.segments)
     majorant = MajorantAlongRays(flight.case.majorant, flight.medium, 1.0, flight.segments)
     expected = np.exp(-2.0 * depth) * np.expm1(majorant.square_over_majorant())
     check_variance(flight.record(2048).score, expected, ALPHA)
 
 
-def cost(rig, change, **axes):
-    flight = rig.flight(**axes, change=change)
+def cost(rig, **axes):
+    flight = rig.flight(**axes)
     majorant = MajorantAlongRays(flight.case.majorant, flight.medium, 1.0, flight.segments)
     check_count(flight.record(512).lookups, majorant.collisions_until_real(), ALPHA)
 
 
-def order(rig, change, **axes):
+def order(rig, **axes):
     steps = np.array([0.1, 0.05, 0.025])
     bias = []
     for step in steps:
         tracker = {"march": {"step": float(step), "placement": "midpoint"}}
-        flight = rig.flight(tracker=tracker, arithmetic="double", **axes, change=change)
+        flight = rig.flight(tracker=tracker, arithmetic="double", **axes)
         bias.append(np.sqrt(np.mean((flight.run(2).moments.mean - flight.reference()) ** 2)))
     check_order(steps, np.array(bias), 2, tolerance=0.1)
 
 
-def thin_mean(rig, change, **axes):
-    flight = rig.flight(**axes, tightness=1e4, change=change)
+def thin_mean(rig, **axes):
+    flight = rig.flight(**axes, tightness=1e4)
     check_mean(flight.run(2048).moments, flight.reference(), ALPHA)
 
 
-def each_path(rig, change, **axes):
+def each_path(rig, **axes):
     axes = axes | {"estimand": "free_path", "arithmetic": "double", "lanes": 4}
-    flight = rig.flight(**axes, change=change)
+    flight = rig.flight(**axes)
     rays = {"orthographic": {"resolution": 16}}
     deep = {"homogeneous": {"sigma_t": 1, "size": 1000}}
     depths = rig.flight(**axes | {"tracker": "analytic", "medium": deep}, rays=rays).record(256).t
     cases.check_each_path(flight, flight.record(256), depths)
 
 
-def same_samples(rig, change, **axes):
+def same_samples(rig, **axes):
     """In two blocks as in one."""
-    flight = rig.flight(**axes, change=change)
+    flight = rig.flight(**axes)
     one, other = flight.record(256), flight.record(128, blocks=2)
     scores = one.score, other.score
     check_same_samples(*scores, (one.lookups, other.lookups), flight.rounding)
@@ -221,12 +221,12 @@ DEFECTS = {
 @pytest.mark.parametrize("name", DEFECTS)
 def test_a_defect_is_found(rig, name):
     defect = DEFECTS[name]
-    defect.check(rig, None, **defect.axes)
+    defect.check(rig, **defect.axes)
     with pytest.raises(AssertionError, match=defect.message):
-        defect.check(rig, defect.change, **defect.axes)
+        defect.check(rig.with_change(defect.change), **defect.axes)
+    assert defect.change.planted
 
 
-def test_a_defect_without_its_place_is_an_error(rig):
-    for text in ("no such text", "path"):
-        with pytest.raises(LookupError, match="places"):
-            rig.flight(**RATIO, change=Change(text, ""))
+def test_a_defect_in_several_places_is_an_error(rig):
+    with pytest.raises(LookupError, match="places"):
+        rig.with_change(Change("path", "")).flight(**RATIO)

@@ -4,9 +4,10 @@ import itertools
 
 import numpy as np
 import pytest
+from freepath.check.cases import check_samples
+from freepath.check.identities import check_clean
+from freepath.check.verdict import require, sidak
 from scipy import stats
-from support.cases import check_samples
-from support.identities import check_clean, require, sidak
 
 CELLS = 8
 RANDOM = np.random.default_rng(4)

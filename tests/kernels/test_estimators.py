@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 from freepath import majorants
-from support.identities import check_count, check_mean, check_variance, sidak
+from freepath.check.identities import check_count, check_mean, check_variance
+from freepath.check.verdict import sidak
 
 SAMPLES = 4096
 POINTS = 2048  # of the midpoint rule along a ray: its error is far below that of the samples

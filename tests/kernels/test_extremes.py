@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from freepath.check.cases import check_samples
+from freepath.check.identities import check_clean, check_mean
 from freepath.runner import STEP_CAP
-from support.cases import check_samples
-from support.identities import check_clean, check_mean
 
 FEW = {"chords": {"count": 16}}
 GRID = {"grid": {"resolution": [5, 3, 4]}}
