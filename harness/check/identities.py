@@ -43,7 +43,7 @@ def _require_groups(
     # a sum of differences, as that of two sums would lose its digits where all is nearly 1
     difference = np.bincount(group, (measured - expected)[order], GROUPS)
     p_values = 2.0 * stats.norm.sf(np.abs(difference[there]) / np.sqrt(square[there]))
-    require(p_values, alpha, what, (found / rays)[there], (wanted / rays)[there])
+    require(p_values, alpha, what, found[there] / rays[there], wanted[there] / rays[there])
 
 
 def check_clean(one: Round, *, bounded: bool) -> None:

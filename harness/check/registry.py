@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 from freepath.catalog import Catalog
 from freepath.check.model import Check
-from freepath.check.suite import identity
+from freepath.check.suite import empty_full, geometry, identity, majorants, thickness
 from freepath.errors import NothingMatchedError, UsageError
 
-SUITE = (identity,)
+SUITE = (identity, empty_full, thickness, majorants, geometry)
 
 
 def checks(catalog: Catalog) -> list[Check]:

@@ -130,7 +130,8 @@ class Rig:
     def volume(self, voxels: np.ndarray, **keys: Any) -> dict[str, Any]:
         """A medium of a config from voxels [z, y, x], by way of a file as a user gives them."""
         path = self.folder / f"{source.combined_hash(np.ascontiguousarray(voxels).tobytes())}.npy"
-        np.save(path, voxels.astype(np.float32))
+        if not path.exists():
+            np.save(path, voxels.astype(np.float32))
         return {"volume": {"file": str(path), **keys}}
 
     def case(self, *, rays: dict = CHORDS, seed: int | None = None, **axes: Any) -> Case:
