@@ -8,10 +8,19 @@ from dataclasses import dataclass
 
 from freepath.catalog import Catalog
 from freepath.check.model import Check
-from freepath.check.suite import empty_full, geometry, identity, majorants, thickness
+from freepath.check.suite import (
+    empty_full,
+    geometry,
+    identity,
+    long_runs,
+    majorants,
+    moments,
+    random_numbers,
+    thickness,
+)
 from freepath.errors import NothingMatchedError, UsageError
 
-SUITE = (identity, empty_full, thickness, majorants, geometry)
+SUITE = (identity, moments, random_numbers, empty_full, thickness, majorants, geometry, long_runs)
 
 
 def checks(catalog: Catalog) -> list[Check]:

@@ -105,7 +105,7 @@ class Rig:
         self.catalog = catalog
         self.folder = folder
         self.seed = seed
-        self._change: Change | None = None
+        self._changes: tuple[Change, ...] = ()
         self._programs: dict[str, Program] = {}
         self._media: dict[str, Medium] = {}
 
@@ -124,7 +124,7 @@ class Rig:
     def with_change(self, change: Change) -> Rig:
         """The same rig with a defect in each source that has a place for it."""
         rig = copy(self)
-        rig._change = change
+        rig._changes = (*self._changes, change)
         return rig
 
     def volume(self, voxels: np.ndarray, **keys: Any) -> dict[str, Any]:
@@ -175,8 +175,8 @@ class Rig:
 
     def program(self, text: Source) -> Program:
         """Build a source, each only once."""
-        if self._change:
-            text = Source(self._change.apply(text.text), text.options)
+        for change in self._changes:
+            text = Source(change.apply(text.text), text.options)
         if text.sha256 not in self._programs:
             self._programs[text.sha256] = self.device.build(text)
         return self._programs[text.sha256]

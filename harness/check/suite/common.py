@@ -43,8 +43,8 @@ def hard(
 
 
 def everyone(tracker: Tracker) -> bool:
-    """Every tracker."""
-    return True
+    """Every tracker that flies: not one that only looks up."""
+    return not {"transmittance", "free_path"}.isdisjoint(tracker.estimands)
 
 
 def walks(tracker: Tracker) -> bool:
@@ -95,17 +95,15 @@ def voxels(
 
     A tracker that needs a closed form flies through layers of one column of them.
     """
+    interpolation = axes.pop("interpolation", "trilinear")
     if knows_depth(tracker):
         count = len(values)
         column = (values[:, 1, 2] / length).tolist()
         inner = [length * i / count for i in range(1, count)]
         layers = {"breakpoints": inner, "values": column, "size": [length] * 3}
         return fly(rig, tracker, {"layered": layers}, length, **axes)
-    interpolation = axes.pop("interpolation", "trilinear")
     size = length / len(values)
-    medium = rig.volume(
-        values, voxel_size=size, sigma_t=1.0 / length, interpolation=interpolation
-    )
+    medium = rig.volume(values, voxel_size=size, sigma_t=1.0 / length, interpolation=interpolation)
     return fly(rig, tracker, medium, length, **axes)
 
 

@@ -53,7 +53,7 @@ def checks(catalog: Catalog) -> Iterator[Check]:
     yield from hard(
         catalog,
         (GROUP, "all-equal", all_equal),
-        lambda t: walks(t),
+        walks,
         "A grid of equal voxels is a homogeneous medium: another path there means that the walk "
         "or the interpolation adds something of its own.",
     )

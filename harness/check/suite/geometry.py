@@ -13,8 +13,6 @@ from freepath.check.identities import check_clean
 from freepath.check.model import Check
 from freepath.check.rig import Rig
 from freepath.check.suite.common import (
-
-    GRID,
     UPWARD,
     VOXELS,
     everyone,
@@ -23,6 +21,7 @@ from freepath.check.suite.common import (
     unit,
     voxels,
 )
+from freepath.check.suite.thickness import WITHIN_1
 from freepath.check.truth import MajorantAlongRays
 from freepath.check.verdict import demand, require
 from freepath.stats import Moments
@@ -166,9 +165,12 @@ def crossings(rig: Rig, alpha: float, tracker: Tracker) -> None:
     along = MajorantAlongRays(flight.case.majorant, flight.medium, 1.0, flight.segments)
     found = flight.run(1).counters["crossings"]
     expected = along.planes()
-    demand(abs(found - expected) <= 8, f"{found} planes crossed, expected {expected}")
+    # rounding may put the box's own plane just inside the end of a ray
+    most = expected + len(flight.segments)
+    text = f"{found} planes crossed, expected {expected} to {most}"
+    demand(expected - 8 <= found <= most + 8, text)
     ties = voxels(rig, tracker, VOXELS, lines=LINES["corner"]).run(1).counters["crossings"]
-    demand(3 * 8 <= ties <= 9 * 8, f"{ties} crossings of 8 diagonals of 4 cells, expected 24")
+    demand(3 * 8 <= ties <= 4 * 8, f"{ties} crossings of 8 diagonals, expected 24 to 32")
 
 
 def scaled(rig: Rig, alpha: float, tracker: Tracker, length: float) -> None:
@@ -208,9 +210,7 @@ def contrast(rig: Rig, alpha: float, tracker: Tracker) -> None:
         origins = np.column_stack([np.full(count**2, -1.0), y, z])
         lines = origins, np.tile([1.0, 0.0, 0.0], (count**2, 1))
     # the rays of a chord meet the voxel where it is interpolated: few samples, of many lookups
-    flight = voxels(
-        rig, tracker, values, lines=lines, majorant=GRID, rays=UPWARD, interpolation="nearest"
-    )
+    flight = voxels(rig, tracker, values, lines=lines, rays=UPWARD, interpolation="nearest")
     samples = flight.record(2)
     demand(not samples.round.counters["nonfinite"], "scores are no numbers")
     demand(not samples.round.counters["violations"], "violations of a majorant that bounds")
@@ -219,6 +219,6 @@ def contrast(rig: Rig, alpha: float, tracker: Tracker) -> None:
     expected = flight.reference()
     thick, clear = expected < 1e-30, expected > 0.9999999
     worst = np.abs(samples.score[thick]).max(initial=0.0)
-    demand(worst < 1e-6 or not tracker.unbiased, f"{worst:.3g} comes through 10^6")
+    demand(worst < 1e-6 or tracker.name not in WITHIN_1, f"{worst:.3g} comes through 10^6")
     lost = np.abs(samples.score[clear] - 1.0).max(initial=0.0)
     demand(lost < 1e-3, f"{lost:.3g} is lost beside it")

@@ -130,7 +130,7 @@ def thick(rig: Rig, alpha: float, tracker: Tracker, depth: float) -> None:
     text = f"mean {one.round.estimate:.3g} +- {error:.2g}, expected 0"
     demand(abs(one.round.estimate) < stats.norm.isf(alpha / 2) * error + 1e-6, text)
     if tracker.name in WITHIN_1:
-        demand(0.0 <= one.weight.min() and one.weight.max() <= 1.0, "a weight beyond [0, 1]")
+        demand(one.weight.min() >= 0.0 and one.weight.max() <= 1.0, "a weight beyond [0, 1]")
     if splits_off(tracker) or not cut:
         lookups = one.lookups.max()
         demand(lookups <= 8.0 * depth + 1e5, f"{lookups:.3g} lookups for a path")
