@@ -1,6 +1,13 @@
-"""Relatives that differ in form only."""
+"""Relatives that differ in form only; the bias of those that need a majorant that bounds."""
 
+import numpy as np
 import pytest
+from freepath.check.identities import check_mean
+from freepath.check.suite.expectations import AlongRays
+from freepath.check.verdict import sidak
+
+SAMPLES = 4096
+ALPHA = 1e-4
 
 
 @pytest.mark.parametrize(
