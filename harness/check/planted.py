@@ -114,9 +114,9 @@ KERNELS = (
         f"{ID}/telescoping_march/transmittance/trilinear/global",
     ),
     Defect(
-        "a power series without its factorial",
-        "factorial *= k;",
-        "",
+        "a comb whose last tooth is left out",
+        "const real length = path->length / state->teeth;",
+        "const real length = path->length / (state->teeth + (SCALAR)1);",
         f"{ID}/unbiased_march/transmittance/trilinear/grid",
     ),
     Defect(
@@ -136,7 +136,7 @@ KERNELS = (
         "the majorant of the cell beside",
         "(j + 1) * row + (i + 1);",
         "j * row + (i + 1);",
-        DELTA,
+        f"{HARD}/geometry/axis/delta",
     ),
     Defect(
         "a walk that leaves one cell too late", "(SCALAR)1 - where,", "(SCALAR)2 - where,", DELTA
@@ -163,12 +163,6 @@ KERNELS = (
         "the last cell of a ray left out",
         "path->depth = choose(path->live, depth,",
         "path->depth = choose(path->live & less(t_exit, path->length), depth,",
-        f"{ID}/regular/transmittance/layered/global",
-    ),
-    Defect(
-        "a layer walked into beyond the last",
-        "choose(flat | outermost | less(",
-        "choose(flat | less(",
         f"{ID}/regular/transmittance/layered/global",
     ),
     Defect(

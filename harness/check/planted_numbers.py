@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from freepath.check.planted import HARD, ID, PARTS, Defect
+from freepath.check.planted import HARD, PARTS, Defect
 
 NUMBERS = (
     # random numbers
@@ -54,7 +54,7 @@ NUMBERS = (
         "reused random numbers: the control draws what the residual draws",
         "Rng control_rng = companion(rng);",
         "Rng control_rng = *rng;",
-        f"{ID}/decomposition/transmittance/trilinear/grid",
+        "moments/decomposition/exponential/global",
     ),
     Defect(
         "samples numbered within their block",
@@ -89,8 +89,8 @@ NUMBERS = (
     ),
     Defect(
         "a step cap that is not where it should be",
-        "~less(path->steps, (index)(INTEGER)step_cap)",
-        "~less(path->steps, (index)(INTEGER)step_cap * 2)",
+        "~less(path.steps, (index)(INTEGER)step_cap)",
+        "~less(path.steps, (index)(INTEGER)step_cap * 2)",
         f"{HARD}/loose/step-cap/ratio",
     ),
     Defect(
