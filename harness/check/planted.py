@@ -117,7 +117,7 @@ KERNELS = (
         "a comb whose last tooth is left out",
         "const real length = path->length / state->teeth;",
         "const real length = path->length / (state->teeth + (SCALAR)1);",
-        f"{ID}/unbiased_march/transmittance/trilinear/grid",
+        f"{ID}/unbiased_march/transmittance/homogeneous/global",
     ),
     Defect(
         "a segment that is looked up at its end, not at a random point",
@@ -134,12 +134,15 @@ KERNELS = (
     ),
     Defect(
         "the majorant of the cell beside",
-        "(j + 1) * row + (i + 1);",
-        "j * row + (i + 1);",
-        f"{HARD}/geometry/axis/delta",
+        "walk->cell = (k + 1) * slice +",
+        "walk->cell = k * slice +",
+        f"{HARD}/empty-full/half-empty/delta",
     ),
     Defect(
-        "a walk that leaves one cell too late", "(SCALAR)1 - where,", "(SCALAR)2 - where,", DELTA
+        "a walk that leaves one cell too late",
+        "(SCALAR)1 - where,",
+        "(SCALAR)2 - where,",
+        f"{HARD}/empty-full/half-empty/delta",
     ),
     Defect(
         "a walk that steps along the wrong axis",

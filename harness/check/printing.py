@@ -86,7 +86,7 @@ def matrix(by_device: dict[str, list[Outcome]]) -> str:
     lines = [f"{chr(ord('A') + i)} = {device}" for i, device in enumerate(devices)] + [""]
     found = {d: {one.name: one for one in outcomes} for d, outcomes in by_device.items()}
     names = list(dict.fromkeys(name for outcomes in found.values() for name in outcomes))
-    width = max(map(len, names), default=4)
+    width = max(map(len, ["check", *names]))
     header = " ".join(chr(ord("A") + i) for i in range(len(devices)))
     lines.append(f"{'check':<{width}}  {header}")
     reasons: dict[str, list[str]] = defaultdict(list)
