@@ -134,15 +134,15 @@ KERNELS = (
     ),
     Defect(
         "the majorant of the cell beside",
-        "walk->cell = (k + 1) * slice +",
-        "walk->cell = k * slice +",
-        f"{HARD}/empty-full/half-empty/delta",
+        "(j + 1) * row + (i + 1);",
+        "j * row + (i + 1);",
+        f"{ID}/delta/free_path/gaussian/grid",
     ),
     Defect(
         "a walk that leaves one cell too late",
         "(SCALAR)1 - where,",
         "(SCALAR)2 - where,",
-        f"{HARD}/empty-full/half-empty/delta",
+        f"{ID}/delta/free_path/gaussian/grid",
     ),
     Defect(
         "a walk that steps along the wrong axis",
