@@ -11,12 +11,13 @@ from contextlib import contextmanager
 from typing import Any
 
 import shtab
-from freepath.commands import devices, listing, report, run, source
+from freepath.commands import check, devices, listing, report, run, source
 from freepath.errors import FAILED, INTERRUPTED, FreepathError
 from freepath.version import __version__
 
 COMMANDS = {
     "run": run,
+    "check": check,
     "report": report,
     "source": source,
     "list": listing,
@@ -24,7 +25,7 @@ COMMANDS = {
 }
 
 EPILOG = """\
-exit codes: 0 fine; 2 usage or config; 5 nothing matched; 8 a case failed; 130 interrupted
+exit codes: 0 fine; 2 usage or config; 5 nothing matched; 8 a case or check failed; 130 interrupted
 
 examples:
   freepath run quick                        the sweep that ships for a first look
@@ -34,6 +35,7 @@ examples:
   freepath run my.yaml -o out --resume      go on where an interrupted run stopped
   freepath list trackers                    what can be compared
   freepath report out -o picture.png        its errors over device time, as a picture
+  freepath check -L fast -j 2               does this device compute what it should?
   freepath source quick --case 3            the OpenCL C that case 3 runs
 """
 

@@ -62,6 +62,10 @@ class ConfigError(FreepathError):
         self.problems = problems
 
 
+class UsageError(FreepathError):
+    """An argument of the command line that cannot be used."""
+
+
 class CatalogError(FreepathError):
     """A kernel file whose front matter cannot be used."""
 

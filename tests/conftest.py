@@ -1,5 +1,7 @@
 """A small catalog of made-up trackers, so that tests of configs do not depend on the kernels."""
 
+import os
+
 import pytest
 from freepath import catalog
 
@@ -72,3 +74,25 @@ def work(tmp_path, monkeypatch):
     folder.mkdir()
     monkeypatch.chdir(folder)
     return folder
+
+
+@pytest.fixture(scope="session")
+def device_under_test():
+    """$FREEPATH_TEST_DEVICE, else the PoCL that comes with pip, else the first device."""
+    from freepath.device import open_devices
+    from freepath.errors import DeviceError
+
+    chosen = os.environ.get("FREEPATH_TEST_DEVICE")
+    if chosen:
+        return open_devices([chosen])[0]
+    try:
+        return open_devices(["3.0"])[0]
+    except DeviceError:
+        return open_devices([])[0]
+
+
+@pytest.fixture(scope="session")
+def rig(device_under_test, tmp_path_factory):
+    from freepath.check.rig import Rig
+
+    return Rig(device_under_test, catalog.load(), tmp_path_factory.mktemp("rig"))

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from freepath import limits
 from freepath.catalog import load
+from freepath.check.rig import Rig
 from freepath.errors import DriverLimitError
 from freepath.limits import joined, parts_of
 from freepath.runner import Pace, Runner
-from support.rig import Rig
 
 
 @pytest.fixture

@@ -28,6 +28,7 @@ ORDER = (
     ("rows", "table", "binding"),
     ("sweep", "report"),
     ("run", "arguments", "device_setup"),
+    ("check",),
     ("commands",),
     ("cli",),
     ("__main__",),

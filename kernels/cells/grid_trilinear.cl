@@ -3,9 +3,11 @@ title: The cells between the voxel centres of a trilinear grid
 uses: [walk/dda, math/newton]
 ---*/
 /* Between eight voxel centres the extinction along a ray is a cubic of the distance, so its optical depth
-   is a quartic, exactly. The planes lie at i + 1/2. */
+   is a quartic, exactly. The planes lie at i + 1/2. The cubic is one of the share of the cell's span: of the
+   distance its coefficients would vanish in float where a length unit is small against a voxel. */
 typedef struct {
     real c0, c1, c2, c3;
+    real per_span;
 } Cell;
 
 static void cells_begin(Path *path, const Scene *scene)
@@ -27,28 +29,28 @@ static real cell_exit(const Path *path, const Scene *scene)
     return smaller(plane, path->length);
 }
 
-/* Along one axis: the voxel below, where in its interval the path enters, and how fast it moves there.
+/* Along one axis: the voxel below, where in its interval the path enters, and how far it gets there.
    Beyond the outermost centres nothing changes along the axis. */
-static index cell_axis(const real origin, const real direction, const real t_enter, const real t_middle,
-                       const SCALAR voxels, real *start, real *speed)
+static index cell_axis(const real origin, const real direction, const real t_enter, const real span,
+                       const SCALAR voxels, real *start, real *rise)
 {
-    const real middle = origin + t_middle * direction - (SCALAR)0.5;
+    const real middle = origin + (t_enter + (SCALAR)0.5 * span) * direction - (SCALAR)0.5;
     const index below = voxel_below(middle, voxels);
     const mask outside = less(middle, (real)0) | less((real)(voxels - 1), middle);
     *start = saturate(origin + t_enter * direction - (SCALAR)0.5 - to_real(below));
     *start = choose(outside, saturate(middle - to_real(below)), *start);
-    *speed = choose(outside, (real)0, direction);
+    *rise = choose(outside, (real)0, direction * span);
     return below;
 }
 
 static Cell cell_between(Path *path, const Scene *scene, const real t_enter, const real t_exit, const mask here)
 {
     count(path->lookups, here);
-    const real middle = (SCALAR)0.5 * (t_enter + t_exit);
+    const real span = t_exit - t_enter;
     real x, y, z, dx, dy, dz;
-    const index i = cell_axis(path->origin_x, path->direction_x, t_enter, middle, scene->medium.nx, &x, &dx);
-    const index j = cell_axis(path->origin_y, path->direction_y, t_enter, middle, scene->medium.ny, &y, &dy);
-    const index k = cell_axis(path->origin_z, path->direction_z, t_enter, middle, scene->medium.nz, &z, &dz);
+    const index i = cell_axis(path->origin_x, path->direction_x, t_enter, span, scene->medium.nx, &x, &dx);
+    const index j = cell_axis(path->origin_y, path->direction_y, t_enter, span, scene->medium.ny, &y, &dy);
+    const index k = cell_axis(path->origin_z, path->direction_z, t_enter, span, scene->medium.nz, &z, &dz);
     const INTEGER row = (INTEGER)scene->medium.nx, slice = row * (INTEGER)scene->medium.ny;
     const index voxel = k * slice + j * row + i;
     /* Interpolation along x gives lines, along y quadratics, along z the cubic. */
@@ -71,13 +73,16 @@ static Cell cell_between(Path *path, const Scene *scene, const real t_enter, con
     cell.c1 = quadratic[0][1] + z * gap_1 + dz * gap_0;
     cell.c2 = quadratic[0][2] + z * gap_2 + dz * gap_1;
     cell.c3 = dz * gap_2;
+    const mask some = less((real)0, span);
+    cell.per_span = choose(some, (SCALAR)1 / choose(some, span, (real)1), (real)0);
     return cell;
 }
 
 static real cell_depth(const Cell cell, const real s)
 {
     const real third = (SCALAR)1 / (SCALAR)3;
-    return s * (cell.c0 + s * ((SCALAR)0.5 * cell.c1 + s * (third * cell.c2 + s * ((SCALAR)0.25 * cell.c3))));
+    const real u = s * cell.per_span;
+    return s * (cell.c0 + u * ((SCALAR)0.5 * cell.c1 + u * (third * cell.c2 + u * ((SCALAR)0.25 * cell.c3))));
 }
 
 /* Lanes whose depth is beyond the cell find its end at once, and do not keep the others waiting. */
@@ -88,7 +93,8 @@ static real cell_distance(const Cell cell, const real depth, const real length)
     Bracket bracket = {(real)0, length, length * wanted / total, (real)FAR};
     for (int i = 0; i < NEWTON_STEPS; ++i) {
         const real s = bracket.at;
-        const real sigma = cell.c0 + s * (cell.c1 + s * (cell.c2 + s * cell.c3));
+        const real u = s * cell.per_span;
+        const real sigma = cell.c0 + u * (cell.c1 + u * (cell.c2 + u * cell.c3));
         if (!any_lane(newton(&bracket, cell_depth(cell, s) - wanted, sigma)))
             break;
     }

@@ -5,9 +5,10 @@ import shutil
 
 import pytest
 from freepath import catalog
+from freepath.check.cases import check_case
+from freepath.check.suite.identity import WALKS, cases_of
+from freepath.check.verdict import sidak
 from freepath.cli import main
-from support.cases import cases_of, check_case
-from support.identities import sidak
 
 # Free probabilities for real and null, with the sign of sigma_n in the weight: unbiased for any
 # majorant, and delta tracking where it bounds.
@@ -111,6 +112,7 @@ def some_cases(tracker):
     """Two media, and majorants that bound and that do not."""
     media = ("layered", "trilinear")
     chosen = [axes for axes in cases_of(tracker) if axes["medium"] in media]
+    chosen = [axes | {"majorant": WALKS[axes["majorant"]]} for axes in chosen]
     return [axes | {"tightness": tightness} for axes in chosen for tightness in (1, 0.8)]
 
 

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from freepath.check.identities import check_count, check_mean, check_variance
+from freepath.check.verdict import sidak
 from freepath.stats import Moments
 from support.derivations import (
     AlongRays,
@@ -14,7 +16,6 @@ from support.derivations import (
     ratio,
     two_knob,
 )
-from support.identities import check_count, check_mean, check_variance, sidak
 
 SAMPLES = 2048
 # Tails too heavy for a sample variance: rays that are thicker, or whose fourth central moment is

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support.identities import check_same_samples
+from freepath.check.identities import check_same_samples
 
 SAMPLES = 2048
 TRACKERS = {

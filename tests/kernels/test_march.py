@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from freepath.check.identities import check_mean, check_order
+from freepath.check.truth import depth_at
+from freepath.check.verdict import sidak
 from freepath.scene.special import NODES, WEIGHTS
-from support.identities import check_mean, check_order, sidak
-from support.truth import depth_at
 
 # Smooth and curved along every ray: where sigma_t has kinks the order is another.
 MEDIUM = {"gaussian": {"sigma_t": 3.0, "width": 0.4, "center": [0.4, 0.6, 0.3]}}

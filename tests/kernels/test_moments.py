@@ -4,9 +4,10 @@ import itertools
 
 import numpy as np
 import pytest
-from support.identities import check_count, check_mean, check_variance, sidak
-from support.media import MAJORANTS, MEDIA
-from support.truth import MajorantAlongRays
+from freepath.check.identities import check_count, check_mean, check_variance
+from freepath.check.media import MAJORANTS, MEDIA
+from freepath.check.truth import MajorantAlongRays
+from freepath.check.verdict import sidak
 
 SAMPLES = 4096
 # Beyond this optical depth the weights of ratio tracking have so heavy a tail that the variance of

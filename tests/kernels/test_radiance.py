@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from freepath.check.identities import check_clean, check_mean
+from freepath.check.rig import Change
+from freepath.check.verdict import require, sidak
 from freepath.stats import Moments
 from scipy import stats
-from support.identities import check_clean, check_mean, require, sidak
-from support.rig import Change
 
 ALPHA = 1e-4
 GRID = {"cloud": {"resolution": 16, "interpolation": "trilinear"}}

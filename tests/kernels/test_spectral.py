@@ -4,9 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
-from freepath.stats import Moments
-from scipy import stats
-from support.identities import (
+from freepath.check.identities import (
     check_clean,
     check_count,
     check_mean,
@@ -15,7 +13,9 @@ from support.identities import (
     check_weighted_free_path,
     sidak,
 )
-from support.truth import depth_at
+from freepath.check.truth import depth_at
+from freepath.stats import Moments
+from scipy import stats
 
 SAMPLES = 4096
 PROBABILITIES = ("maximum", "average", "history_maximum", "history_average")
@@ -187,7 +187,7 @@ def test_the_error_of_the_mean_knows_that_channels_are_correlated(rig):
 @pytest.mark.parametrize("change", ["history", "probability", "channel"])
 def test_a_defect_is_found(rig, change):
     """A weight without the majorant's share, a probability not divided by, channels swapped."""
-    from support.rig import Change
+    from freepath.check.rig import Change
 
     changes = {
         "history": Change(

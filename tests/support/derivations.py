@@ -10,11 +10,10 @@ from functools import cached_property
 
 import numpy as np
 from freepath import majorants
+from freepath.check.rig import Flight
 from freepath.scene import Medium
 from numpy.typing import NDArray
 from scipy import stats
-
-from support.rig import Flight
 
 Array = NDArray[np.float64]
 

@@ -13,12 +13,11 @@ from typing import Any
 
 import numpy as np
 from freepath import catalog, device
+from freepath.check.rig import Rig
+from freepath.check.suite.identity import Axes, cases_of, name_of
 from freepath.device import Device
 from freepath.errors import FreepathError
 from freepath.source import Source
-
-from support.cases import Axes, cases_of, name_of
-from support.rig import Rig
 
 RAYS, SAMPLES = 12, 4
 DEFECTS = {
@@ -35,6 +34,8 @@ def chosen_cases() -> list[Axes]:
     chosen = []
     for place, tracker in enumerate(catalog.load().trackers.values()):
         cases = cases_of(tracker)
+        if not cases:
+            continue  # of paths that scatter only
         chosen.append(cases[place % len(cases)] | {"lanes": (1, 4)[place % 2]})
     return chosen
 

@@ -42,6 +42,11 @@ class MajorantAlongRays:
             cuts.append(crossings(position, direction, planes, self._segments[:, 6]))
         return np.concatenate(cuts, axis=1)
 
+    def planes(self) -> int:
+        """How many planes between cells all rays cross together."""
+        cuts, ends = self._cuts(), self._segments[:, 6:]
+        return int(np.count_nonzero((cuts > 0.0) & (cuts < ends)))
+
     def _points(self, t: Array) -> Array:
         return self._segments[:, None, :3] + t[..., None] * self._segments[:, None, 3:6]
 

@@ -8,6 +8,7 @@ checked as the project's own are.
 from __future__ import annotations
 
 import numpy as np
+from freepath.check.verdict import demand, require
 from freepath.runner import Round
 from freepath.stats import Moments
 from numpy.typing import NDArray
@@ -19,42 +20,37 @@ RESOLVED = 0.05  # relative standard error of a mean that says something
 GROUPS = 8  # of rays with like expectations: errors of thin and of thick rays must not cancel
 
 
-def sidak(alpha: float, tests: int) -> float:
-    """The level of each of several tests such that all together reject wrongly with `alpha`."""
-    return float(-np.expm1(np.log1p(-alpha) / tests))
-
-
-def require(p_values: Array, alpha: float, what: str) -> None:
-    """Fail where the smallest of several p-values is smaller than chance explains."""
-    p_values = np.atleast_1d(p_values)
-    level, worst = sidak(alpha, len(p_values)), int(np.argmin(p_values))
-    if not p_values[worst] >= level:  # also where it is no number
-        text = f"{what}: p = {p_values[worst]:.2g} in part {worst} of {len(p_values)}"
-        raise AssertionError(f"{text}, expected at least {level:.2g}")
-
-
-def _p_of_groups(deviation: Array, square_error: Array, order_by: Array) -> Array:
-    """Two-sided p-values of sums over groups of rays with independent errors.
+def _require_groups(
+    measured: Array, expected: Array, square_error: Array, order_by: Array, test: tuple[float, str]
+) -> None:
+    """Two-sided z-tests of sums over groups of rays with independent errors.
 
     Each group has the same share of all noise: a group of rays on which hardly anything happens
     would have no normal distribution, nor a sample of its variance.
     """
+    alpha, what = test
     order = np.argsort(order_by, kind="stable")
     share = np.cumsum(square_error[order])
     if share[-1] == 0.0:
-        return np.array([float(not deviation.any())])
+        demand((measured == expected).all(), f"{what}: without variance, and not as expected")
+        return
     group = np.minimum((GROUPS * share / share[-1]).astype(int), GROUPS - 1)
-    difference = np.bincount(group, deviation[order], GROUPS)
-    error = np.sqrt(np.bincount(group, square_error[order], GROUPS))
-    there = error > 0.0
-    return 2.0 * stats.norm.sf(np.abs(difference[there]) / error[there])
+    rays = np.bincount(group, minlength=GROUPS)
+    found, wanted, square = (
+        np.bincount(group, values[order], GROUPS) for values in (measured, expected, square_error)
+    )
+    there = square > 0.0
+    # a sum of differences, as that of two sums would lose its digits where all is nearly 1
+    difference = np.bincount(group, (measured - expected)[order], GROUPS)
+    p_values = 2.0 * stats.norm.sf(np.abs(difference[there]) / np.sqrt(square[there]))
+    require(p_values, alpha, what, found[there] / rays[there], wanted[there] / rays[there])
 
 
 def check_clean(one: Round, *, bounded: bool) -> None:
     """Nothing capped, nothing infinite, and no violation of a majorant that bounds."""
     watched = ("truncated", "nonfinite", "violations") if bounded else ("truncated", "nonfinite")
     found = {name: one.counters[name] for name in watched}
-    assert not any(found.values()), found
+    demand(not any(found.values()), f"none of these may be counted: {found}")
 
 
 def check_mean(moments: Moments, expected: Array, alpha: float) -> None:
@@ -62,17 +58,16 @@ def check_mean(moments: Moments, expected: Array, alpha: float) -> None:
 
     They must be able to tell something: weights that explode would hide behind their own variance.
     """
-    deviation, square_error = moments.mean - expected, moments.variance / moments.count
+    square_error = moments.variance / moments.count
     noise = np.sqrt(square_error.sum()) / expected.sum()
-    assert noise < RESOLVED, f"mean: known to {noise:.2g} only"
-    require(_p_of_groups(deviation, square_error, expected), alpha, "mean")
+    demand(noise < RESOLVED, f"mean: known to {noise:.2g} only")
+    _require_groups(moments.mean, expected, square_error, expected, (alpha, "mean"))
 
 
 def check_count(counts: Array, expected: Array, alpha: float) -> None:
     """z-tests of the mean of whole numbers (rays, samples), such as lookups."""
     square_error = counts.var(axis=1, ddof=1) / counts.shape[1]
-    p_values = _p_of_groups(counts.mean(axis=1) - expected, square_error, expected)
-    require(p_values, alpha, "count")
+    _require_groups(counts.mean(axis=1), expected, square_error, expected, (alpha, "count"))
 
 
 def check_variance(scores: Array, expected: Array, alpha: float) -> None:
@@ -86,14 +81,14 @@ def check_variance(scores: Array, expected: Array, alpha: float) -> None:
     square = (deviation**2).sum(axis=1) / (count - 1)
     fourth = (deviation**4).mean(axis=1)
     error = np.maximum(fourth - square**2 * (count - 3) / (count - 1), 0.0) / count
-    require(_p_of_groups(square - expected, error, expected), alpha, "variance")
+    _require_groups(square, expected, error, expected, (alpha, "variance"))
 
 
 def check_empty(moments: Moments, depth: Array, rounding: float) -> None:
     """Nothing is lost along a ray through nothing, but for a rounding or two."""
     empty = depth == 0.0
-    lost = np.abs(1.0 - moments.mean[empty])
-    assert not (lost > 4.0 * rounding).any(), f"empty space takes {lost.max():.2g}"
+    lost = np.max(np.abs(1.0 - moments.mean[empty]), initial=0.0)
+    demand(lost <= 4.0 * rounding, f"empty space takes {lost:.2g}")
 
 
 def check_independence(scores: Array, alpha: float) -> None:
@@ -121,12 +116,12 @@ def check_inversion(
     """
     sure = np.abs(target - depth[:, None]) > bound[:, None]
     wrong = sure & (escaped != (target > depth[:, None]))
-    assert not wrong.any(), (
-        f"{np.count_nonzero(wrong)} paths end on the wrong side of the ray's end"
+    demand(
+        not wrong.any(), f"{np.count_nonzero(wrong)} paths end on the wrong side of the ray's end"
     )
     error = np.where(escaped, 0.0, np.abs(depth_at - target)) / bound[:, None]
-    assert error.max() <= 1.0, (
-        f"a free path is off by {error.max():.3g} times the bound of rounding"
+    demand(
+        error.max() <= 1.0, f"a free path is off by {error.max():.3g} times the bound of rounding"
     )
 
 
@@ -149,13 +144,13 @@ def check_exact(
     `depth` bounds the optical depth of each ray from above by majorant x length. Roundings add up
     in the worst case, and as a random walk on average over the rays.
     """
-    assert not moments.m2.any(), "an estimator that claims to be exact varies"
+    demand(not moments.m2.any(), "an estimator that claims to be exact varies")
     scale = rounding * np.maximum(depth, 1.0)
     error = np.abs(moments.mean - expected) / np.maximum(expected, 1e-30)  # far below: underflow
     worst = np.max(error / (roundings(pieces) * scale))
-    assert worst <= 1.0, f"error {worst:.3g} times the bound of rounding"
+    demand(worst <= 1.0, f"error {worst:.3g} times the bound of rounding")
     average = np.sqrt(np.mean((error / scale) ** 2 / roundings(pieces)))
-    assert average <= 1.0, f"error {average:.3g} times that of random rounding"
+    demand(average <= 1.0, f"error {average:.3g} times that of random rounding")
 
 
 def check_free_path(
@@ -171,7 +166,7 @@ def check_free_path(
     """
     collided = ~escaped
     empty = depth == 0.0
-    assert not collided[empty].any(), "a collision in nothing"
+    demand(not collided[empty].any(), "a collision in nothing")
     share = np.expm1(-depth_at) / np.where(empty, -1.0, np.expm1(-depth))[:, None]
     values = share[collided]
     observed = np.histogram(np.clip(values, 0.0, 1.0), bins, (0.0, 1.0))[0]
@@ -207,7 +202,7 @@ def check_weighted_free_path(
         error = np.sqrt((weights.var(axis=1, ddof=1) / weights.shape[1]).sum())
         noise.append(error / expected.sum())
         p_values.append(2.0 * stats.norm.sf(abs(deviation) / error))
-    assert np.median(noise) < 5.0 * RESOLVED, f"free path: bins known to {np.median(noise):.2g}"
+    demand(np.median(noise) < 5.0 * RESOLVED, f"free path: bins known to {np.median(noise):.2g}")
     require(np.array(p_values), alpha, "free path (weighted)")
 
 
@@ -219,15 +214,15 @@ def check_same_samples(one: Array, other: Array, lookups: tuple[Array, Array], r
     """
     other_path = lookups[0] != lookups[1]
     differing = np.count_nonzero(other_path)
-    assert differing < 1e-5 * other_path.size, f"{differing} of {other_path.size} paths differ"
+    demand(differing < 1e-5 * other_path.size, f"{differing} of {other_path.size} paths differ")
     scale = np.maximum(np.abs(one), np.abs(other))
     distance = np.abs(one - other)[~other_path]
     bad = distance > 1000.0 * rounding * np.maximum(scale[~other_path], rounding)
-    assert np.count_nonzero(bad) < 1e-5 * other_path.size, f"{np.count_nonzero(bad)} scores differ"
+    demand(np.count_nonzero(bad) < 1e-5 * other_path.size, f"{np.count_nonzero(bad)} scores differ")
     error = abs(one.mean() - other.mean())
     flips = (differing + np.count_nonzero(bad)) / other_path.size
-    assert error <= 1000.0 * rounding * scale.mean() + flips * scale.max(), (
-        f"means differ by {error}"
+    demand(
+        error <= 1000.0 * rounding * scale.mean() + flips * scale.max(), f"means differ by {error}"
     )
 
 
@@ -235,4 +230,4 @@ def check_order(steps: Array, bias: Array, order: float, tolerance: float) -> No
     """The bias falls as steps^order: the slope of its logarithm, by least squares."""
     slope = float(np.polyfit(np.log(steps), np.log(np.abs(bias)), 1)[0])
     text = f"converges at order {slope:.3f}, expected {order} +- {tolerance}"
-    assert abs(slope - order) <= tolerance, text
+    demand(abs(slope - order) <= tolerance, text)

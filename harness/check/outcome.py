@@ -1,0 +1,26 @@
+"""What became of a check on a device."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+PASSED, FAILED, TIMEOUT, CRASHED, SKIPPED = "Passed", "Failed", "Timeout", "Crashed", "Skipped"
+WRONG = (FAILED, TIMEOUT, CRASHED)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How it ended, after how many seconds, and what it said."""
+
+    number: int
+    name: str
+    labels: tuple[str, ...]
+    status: str
+    seconds: float
+    text: str = ""
+    repeat: int = 0
+
+    @property
+    def wrong(self) -> bool:
+        """Whether it failed, in whatever way."""
+        return self.status in WRONG

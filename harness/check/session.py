@@ -1,0 +1,119 @@
+"""A run of checks: on each device in processes of its own, told as it goes on."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from freepath.check import printing
+from freepath.check.model import BUDGET, Check
+from freepath.check.outcome import Outcome
+from freepath.check.pool import Pool, Task
+from freepath.check.worker import Setting
+from freepath.device import NO_DEVICE, DeviceInfo, list_devices, matches
+from freepath.errors import DeviceError
+from scipy import stats
+
+Chosen = Sequence[tuple[int, Check]]
+
+
+def devices_of(selectors: Sequence[str]) -> list[DeviceInfo]:
+    """The devices that -d means: the first without it; raises DeviceError where there is none."""
+    known = list_devices()
+    if not known:
+        raise DeviceError(NO_DEVICE)
+    if not selectors:
+        return known[:1]
+    for selector in selectors:
+        if not any(matches(info, selector) for info in known):
+            names = "\n".join(f"  {info.label}" for info in known)
+            raise DeviceError(f"no OpenCL device matches '{selector}'; there are\n{names}")
+    return [info for info in known if any(matches(info, selector) for selector in selectors)]
+
+
+@dataclass(frozen=True)
+class Options:
+    """How checks are run, and what is told of them."""
+
+    processes: int = 1
+    timeout: float = 300.0
+    repeat: int = 1
+    seed: int | None = None
+    trackers: Sequence[Path] = ()
+    stop_on_failure: bool = False
+    output_on_failure: bool = False
+    verbose: bool = False
+
+
+@dataclass
+class Session:
+    """Runs checks on one device after the other."""
+
+    chosen: Chosen
+    options: Options
+    tell: Callable[[str], None]
+    outcomes: dict[str, list[Outcome]] = field(default_factory=dict)
+    """By the device's label, as they end."""
+
+    def run(self, info: DeviceInfo) -> list[Outcome]:
+        """Run all on a device; raises DeviceError where it cannot be used at all."""
+        options = self.options
+        ended = self.outcomes.setdefault(info.label, [])
+        tasks = [
+            Task(number, check, repeat)
+            for repeat in range(options.repeat)
+            for number, check in self.chosen
+        ]
+        progress = printing.Progress(self.chosen, len(tasks))
+        setting = Setting(f"{info.platform} / {info.name} / {info.driver_version}")
+        setting = replace(setting, trackers=tuple(options.trackers))
+        if options.seed is not None:
+            setting = replace(setting, seed=options.seed)
+        pool = Pool(
+            setting,
+            options.processes,
+            options.timeout,
+            lambda task: self.tell(progress.start(task.number, task.check.name)),
+        )
+        for outcome in pool.outcomes(tasks):
+            ended.append(outcome)
+            self.tell(progress.end(outcome))
+            self._tell_output(outcome)
+            if outcome.wrong and options.stop_on_failure:
+                break
+        return ended
+
+    def _tell_output(self, outcome: Outcome) -> None:
+        check = next(check for number, check in self.chosen if number == outcome.number)
+        if self.options.verbose:
+            self.tell(textwrap.indent(textwrap.fill(check.sentence, 90), "    "))
+        wanted = self.options.output_on_failure and outcome.wrong
+        if outcome.text and (wanted or self.options.verbose):
+            self.tell(textwrap.indent(outcome.text.rstrip(), "    "))
+
+    @property
+    def failed(self) -> list[str]:
+        """The names of the checks that failed on any device."""
+        wrong = (one.name for ended in self.outcomes.values() for one in ended if one.wrong)
+        return list(dict.fromkeys(wrong))
+
+
+def false_alarms(outcomes: Sequence[Outcome], repeats: int) -> tuple[str, bool]:
+    """What repeats with fresh seeds say of false alarms, and whether there are too many.
+
+    Of a right device a run fails with the chance BUDGET at most; too many is what has a chance
+    below 1 in 1000 then.
+    """
+    alarmed = {one.repeat for one in outcomes if one.wrong}
+    test = stats.binomtest(len(alarmed), repeats, BUDGET, alternative="greater")
+    interval = stats.binomtest(len(alarmed), repeats).proportion_ci(0.95, "exact")
+    verdicts = sum(one.wrong for one in outcomes)
+    text = (
+        f"{len(alarmed)} of {repeats} runs with fresh seeds raised an alarm "
+        f"({len(alarmed) / repeats:.2g}, 95 % interval {interval.low:.2g} to {interval.high:.2g}); "
+        f"the budget is {BUDGET:g} a run.\n"
+        f"{verdicts} of {len(outcomes)} verdicts were alarms."
+    )
+    return text, bool(test.pvalue < 1e-3)

@@ -1,0 +1,233 @@
+"""Many samples, numbers beyond 32 bits, long launches, and volumes that must be refused."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+from freepath.catalog import Catalog
+from freepath.check.identities import check_clean, check_same_samples
+from freepath.check.model import Check
+from freepath.check.rig import Rig
+from freepath.check.suite.common import UPWARD
+from freepath.check.verdict import Failure, demand, require
+from freepath.errors import FreepathError
+from scipy import stats
+
+BILLION = 1_000_000_000
+
+
+def checks(catalog: Catalog) -> Iterator[Check]:
+    """The groups accumulation, long-runs and bad-input."""
+    for name, (group, label, sentence, function) in RUNS.items():
+        labels = (label, "hard", group)
+        yield Check(f"hard/{group}/{name}", labels, sentence, function, kernels="long-runs")
+    for name, make in BAD.items():
+        yield Check(
+            f"hard/bad-input/{name}",
+            ("fast", "hard", "bad-input"),
+            "A volume that is not what it should be becomes an answer that looks like one: it is "
+            "refused, with its file, and the first voxel and count where values are wrong.",
+            _refused(make, name),
+            kernels="bad-input",
+        )
+
+
+def _billion(rig: Rig, alpha: float, samples: int) -> None:
+    """Mean, variance and counts of delta tracking in an optical depth of a half."""
+    medium = {"homogeneous": {"sigma_t": 0.5}}
+    rays = {"orthographic": {"resolution": [32, 32]}}
+    flight = rig.flight(tracker="delta", medium=medium, rays=rays, lanes=16, record=False)
+    blocks, each = 512, samples // (1024 * 512)
+    one = flight.run(each, blocks)
+    check_clean(one, bounded=True)
+    total, exact = one.samples, np.exp(-0.5)
+    spread = np.sqrt(exact * (1.0 - exact) / total)
+    lookups = one.counters["lookups"] / total
+    # a lookup for each collision: 1 - T; every tentative collision is real where the bound is met
+    p_values = 2.0 * stats.norm.sf(np.abs([one.estimate - exact, lookups - 1.0 + exact]) / spread)
+    found, expected = np.array([one.estimate, lookups]), np.array([exact, 1.0 - exact])
+    require(p_values, alpha, f"mean, lookups of {total} samples", found, expected)
+    variance = float(one.moments.variance.mean())
+    error = abs(variance / (exact * (1.0 - exact)) - 1.0)
+    demand(error < 1e-3, f"the variance is off by {error:.3g}")
+    demand(one.counters["steps"] >= total, "steps are lost")
+
+
+def million(rig: Rig, alpha: float) -> None:
+    """What a billion is in less time."""
+    _billion(rig, alpha, 2**24)
+
+
+def billion(rig: Rig, alpha: float) -> None:
+    """1e9."""
+    _billion(rig, alpha, BILLION)
+
+
+def still_mean(rig: Rig, alpha: float) -> None:
+    """All scores nearly 1: a mean in float would stand still."""
+    medium = {"homogeneous": {"sigma_t": 1e-5}}
+    flight = rig.flight(tracker="ratio", medium=medium, rays=UPWARD, tightness=1e4, lanes=16)
+    moments = flight.run(2047, 64).moments
+    taken = (1.0 - moments.mean).mean()
+    error = np.sqrt((moments.variance / moments.count).sum()) / len(moments.mean)
+    text = f"takes {taken:.6g}, expected 1e-05"
+    demand(abs(taken + np.expm1(-1e-5)) < stats.norm.isf(alpha / 2) * error + 2.0**-25, text)
+
+
+def far_numbers(rig: Rig, alpha: float) -> None:
+    """From 2^31, 2^32 and 2^40 on: other samples, of the same distribution."""
+    medium = {"homogeneous": {"sigma_t": 1.0}}
+    flight = rig.flight(tracker="delta", medium=medium, rays=UPWARD, lanes=16)
+    usual = flight.record(1024).t
+    for first in (2**31 - 512, 2**32 - 512, 2**40):
+        samples = flight.record(1024, first_sample=first)
+        check_clean(samples.round, bounded=True)
+        same = np.mean(samples.t == usual)
+        demand(same < 0.3, f"{same:.2g} of the samples from {first} on were there before")
+        error = np.sqrt(samples.score.var() / samples.score.size)
+        p_value = 2.0 * stats.norm.sf(abs(samples.score.mean() - np.exp(-1.0)) / error)
+        require(np.array([p_value]), alpha / 3, f"mean from sample {first} on")
+
+
+def blocks(rig: Rig, alpha: float) -> None:
+    """Samples are the same however they are blocked and cut into launches."""
+    flight = rig.flight(tracker="delta", medium="trilinear", majorant="grid", lanes=16)
+    one = flight.record(256)
+    for other in (flight.record(64, blocks=4), flight.record(256, launches=7)):
+        lookups = one.lookups, other.lookups
+        check_same_samples(one.score, other.score, lookups, flight.rounding)
+
+
+def cut_launches(rig: Rig, alpha: float) -> None:
+    """A run of a second or two: no launch of it takes so long, and none of its samples is lost."""
+    medium = {"homogeneous": {"sigma_t": 1.0}}
+    flight = rig.flight(
+        tracker="ratio", medium=medium, rays=UPWARD, tightness=1000, lanes=16, record=False
+    )
+    runner, seconds = flight.runner, []
+    launch = runner.program.launch
+
+    def watched(*arguments: object) -> float:
+        took = launch(*arguments)
+        seconds.append(took)
+        return took
+
+    runner.program.launch = watched  # type: ignore[method-assign]
+    try:
+        done, blocks = 0, 64
+        while sum(seconds) < 1.5 and len(seconds) < 64 and done < 16:
+            one = flight.run(64, blocks, first_sample=done * 2**20)
+            demand(one.samples == 16 * 64 * blocks, f"{one.samples} samples, expected others")
+            done, blocks = done + 1, min(2 * blocks, 1024)
+    finally:
+        del runner.program.launch  # type: ignore[method-assign]
+    demand(max(seconds) < 1.0, f"a launch took {max(seconds):.2f} s of {sum(seconds):.2f} s")
+
+
+Make = Callable[[Path], str]
+"""Writes a bad file; returns what the message must have beside its name."""
+
+
+def _refused(make: Make, name: str) -> Callable[[Rig, float], None]:
+    def run(rig: Rig, alpha: float) -> None:
+        path = rig.folder / f"{name}.{'tif' if name == 'not-an-image' else 'npy'}"
+        wanted = make(path)
+        medium = {"volume": {"file": str(path), "voxel_size": 0.25}}
+        try:
+            rig.flight(tracker="delta", medium=medium, lanes=1)
+        except FreepathError as error:
+            text = str(error)
+            demand(path.name in text, f"the message does not name the file: {text}")
+            for part in wanted.split(";"):
+                demand(part in text, f"the message lacks '{part}': {text}")
+            return
+        raise Failure("the volume was taken for a good one")
+
+    return run
+
+
+def _wrong_value(value: float) -> Make:
+    def make(path: Path) -> str:
+        values = np.ones((4, 4, 4), np.float32)
+        values[1, 2, 3] = values[3, 3, 3] = value
+        np.save(path, values)
+        return "2"
+
+    return make
+
+
+def _saved(values: np.ndarray) -> Make:
+    def make(path: Path) -> str:
+        np.save(path, values)
+        return ""
+
+    return make
+
+
+def _bytes(content: bytes) -> Make:
+    def make(path: Path) -> str:
+        path.write_bytes(content)
+        return ""
+
+    return make
+
+
+def _truncated(path: Path) -> str:
+    np.save(path, np.ones((4, 4, 4), np.float32))
+    path.write_bytes(path.read_bytes()[:-64])
+    return ""
+
+
+BAD: dict[str, Make] = {
+    "nan": _wrong_value(float("nan")),
+    "infinite": _wrong_value(float("inf")),
+    "negative": _wrong_value(-1.0),
+    "two-axes": _saved(np.ones((4, 4), np.float32)),
+    "no-voxels": _saved(np.ones((4, 0, 4), np.float32)),
+    "text": _saved(np.full((2, 2, 2), "x")),
+    "truncated": _truncated,
+    "empty-file": _bytes(b""),
+    "not-a-file-of-numpy": _bytes(b"\x93NUMPY" + struct.pack("<BBH", 9, 9, 4) + b"nope"),
+    "not-an-image": _bytes(b"II*\x00 and nothing that follows"),
+}
+RUNS = {
+    "sixteen-million": (
+        "accumulation",
+        "fast",
+        "A sum in float is wrong in the third digit after 1e7 values.",
+        million,
+    ),
+    "billion": (
+        "accumulation",
+        "slow",
+        "Counts in 32 bits wrap, and sums in float stand still, before 1e9 samples.",
+        billion,
+    ),
+    "still-mean": (
+        "accumulation",
+        "fast",
+        "Where all scores are nearly 1, the share of one is less than the last bit of the mean.",
+        still_mean,
+    ),
+    "far-numbers": (
+        "long-runs",
+        "fast",
+        "A sample number that is cut to 31 or 32 bits repeats the run's beginning.",
+        far_numbers,
+    ),
+    "blocks": (
+        "long-runs",
+        "fast",
+        "Samples that are numbered within their block or launch repeat those of others.",
+        blocks,
+    ),
+    "cut-launches": (
+        "long-runs",
+        "slow",
+        "A launch of seconds is killed by watchdogs and cannot be cancelled.",
+        cut_launches,
+    ),
+}

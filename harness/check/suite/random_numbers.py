@@ -1,0 +1,271 @@
+"""Generators, the logarithm, and samplers at the ends of their domain."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+from freepath.catalog import Catalog, Tracker
+from freepath.check.generators import philox, stream, xoshiro
+from freepath.check.media import MEDIA
+from freepath.check.model import Check
+from freepath.check.parts import Lanes
+from freepath.check.rig import Change, Rig
+from freepath.check.suite.common import everyone, fly, hard
+from freepath.check.verdict import demand, require
+from freepath.config.models import MEDIA as MODELS
+from scipy import stats
+
+GROUP = "random-numbers"
+# Random123-1.14, tests/kat_vectors: philox4x32 with 10 rounds; counter, key, result
+KNOWN = [
+    ([0, 0, 0, 0], [0, 0], [0x6627E8D5, 0xE169C58D, 0xBC57AC4C, 0x9B00DBD8]),
+    ([0xFFFFFFFF] * 4, [0xFFFFFFFF] * 2, [0x408F276D, 0x41C83B0E, 0xA20BC7C6, 0x6D5451FD]),
+    (
+        [0x243F6A88, 0x85A308D3, 0x13198A2E, 0x03707344],
+        [0xA4093822, 0x299F31D0],
+        [0xD16CFE09, 0x94FDCCEB, 0x5001E420, 0x24126EA1],
+    ),
+]
+WORDS = "out0 = rng.s0; out1 = rng.s1; out2 = rng.s2; out3 = rng.s3;"
+ULP = {"log_polynomial": 1.0, "log_builtin": 3.0}
+"""What a logarithm may be off: OpenCL grants its own 3; ours is off by 0.83 at most."""
+# Of four draws one is 0, one the smallest above 0, one the largest below 1, and one as drawn.
+ENDS = Change(
+    "return to_real(next_bits(rng) >> 8) * (SCALAR)5.9604644775390625e-8;",
+    "const bits drawn = next_bits(rng);\n"
+    "    const bits which = drawn & 3u;\n"
+    "    const bits ends = (which >> 1) * ((which & 1u) ? drawn >> 8 : (bits)0xffffffu)\n"
+    "        + ((which >> 1) ^ 1u) * which;\n"
+    "    return to_real(ends) * (SCALAR)5.9604644775390625e-8;",
+)
+
+Body = Callable[[Rig, float, int], None]
+
+
+def checks(catalog: Catalog) -> Iterator[Check]:
+    """The group's checks: of the generators in one lane and in sixteen, of all samplers."""
+    for name, (sentence, body) in PARTS.items():
+        for lanes in (1, 16):
+            yield _part(name, sentence, body, lanes)
+    for name in ULP:
+        yield _part(
+            f"logarithm-{name}",
+            "A logarithm that is off, or not monotone, near 1 or at 2^-24 bends every free path.",
+            lambda rig, alpha, lanes, name=name: logarithm(rig, lanes, name),
+            16,
+        )
+    yield _part(
+        "never-1",
+        "1e9 draws never give 1: its logarithm would be infinite, and a float conversion that "
+        "rounds up gives it once in 33 million.",
+        never_1,
+        16,
+        speed="slow",
+    )
+    yield from hard(
+        catalog,
+        (GROUP, "ends", ends),
+        everyone,
+        "With u = 0, 2^-24 and 1 - 2^-24 fed into every decision, a sampler that divides by what "
+        "is left, or takes the logarithm of 0, becomes no number or runs on for ever.",
+    )
+    for tracker in catalog.trackers.values():
+        if "closed_form" in tracker.needs and "free_path" in tracker.estimands:
+            yield from (_inverse(tracker, m) for m in MEDIA if _closed(m))
+
+
+def _closed(medium: str) -> bool:
+    (kind,) = MEDIA[medium]
+    return "closed_form" in MODELS[kind].OFFERS
+
+
+def _part(name: str, sentence: str, body: Body, lanes: int, speed: str = "fast") -> Check:
+    def run(rig: Rig, alpha: float) -> None:
+        body(rig, alpha, lanes)
+
+    full = f"hard/{GROUP}/{name}/{lanes}-lanes"
+    return Check(full, (speed, "hard", GROUP), sentence, run, kernels=GROUP)
+
+
+def _inverse(tracker: Tracker, medium: str) -> Check:
+    def run(rig: Rig, alpha: float) -> None:
+        ends(rig, alpha, tracker, medium)
+
+    return Check(
+        f"hard/{GROUP}/inverse-{medium}/{tracker.name}",
+        ("fast", "hard", GROUP, tracker.name),
+        "The inverse of a closed form at u = 0 and at the largest u divides 0 by 0, or Newton's "
+        "method leaves its bracket.",
+        run,
+        kernels=f"{tracker.name}/free_path/{medium}/global",
+    )
+
+
+def known_answers(rig: Rig, alpha: float, lanes: int) -> None:
+    """Of the generator's authors, in each lane."""
+    for counter, key, expected in KNOWN:
+        body = f"const Rng c = {{in0, in1, in2, in3}}; rng = philox(c, {key[0]}u, {key[1]}u);"
+        found = Lanes(rig, lanes)(body + WORDS, [[word] for word in counter], ["bits"] * 4, 40)
+        for words, word in zip(found, expected, strict=True):
+            demand((words == word).all(), f"{words.flat[0]:#x} for {counter}, expected {word:#x}")
+
+
+def own_counters(rig: Rig, alpha: float, lanes: int) -> None:
+    """Each lane has the answer of its own."""
+    counters = np.random.default_rng(1).integers(0, 2**32, (4, 48))
+    body = f"const Rng c = {{in0, in1, in2, in3}}; rng = philox(c, 1u, 2u);{WORDS}"
+    found = np.hstack(Lanes(rig, lanes)(body, counters, ["bits"] * 4, 48))
+    same = found == np.column_stack(philox(counters, (1, 2)))
+    demand(same.all(), f"{np.count_nonzero(~same)} of {same.size} words are of other counters")
+
+
+def published(rig: Rig, alpha: float, lanes: int) -> None:
+    """A hundred numbers of forty states; the first of 1, 2, 3, 4 are the authors'."""
+    states = np.random.default_rng(2).integers(0, 2**32, (4, 40))
+    states[:, 0] = 1, 2, 3, 4
+    body = "if (n == 0) { rng.s0 = in0; rng.s1 = in1; rng.s2 = in2; rng.s3 = in3; }"
+    body += "out0 = next_bits(&rng);"
+    (found,) = Lanes(rig, lanes)(body, states, ["bits"], 40, draws=100)
+    numbers = xoshiro([np.asarray(word, np.uint64) for word in states])
+    expected = np.column_stack([next(numbers) for _ in range(100)])
+    demand((found == expected).all(), "its numbers are not those of xoshiro128++")
+    authors = [641, 1573767, 3222811527, 3517856514, 836907274]
+    demand(found[0, :5].tolist() == authors, "its first numbers are not the authors'")
+
+
+def streams(rig: Rig, alpha: float, lanes: int) -> None:
+    """Of rays and samples beyond 2^32."""
+    rays, offsets = np.array([0, 1, 7, 2**31, 2**32 - 1]), np.array([0, 1, 5, 2**31, 2**32 - 1])
+    for first in (0, 2**32 - 3, 2**40 + 2**32 - 1):
+        body = f"rng = stream({2**53 + 5}ul, in0, {first}ul, in1);{WORDS}"
+        found = np.hstack(Lanes(rig, lanes)(body, [rays, offsets], ["bits"] * 4, 5))
+        expected = np.column_stack(stream(2**53 + 5, rays, first + offsets))
+        demand((found == expected).all(), f"other streams than Philox gives from {first} on")
+
+
+def disjoint(rig: Rig, alpha: float, lanes: int) -> None:
+    """A million of 64 rays, from starts on either side of 2^32."""
+    ray, offset = np.meshgrid(np.arange(64), np.arange(2**13), indexing="ij")
+    seen = []
+    for first in (0, 2**32 - 2**12):
+        body = f"rng = stream({rig.seed}ul, in0, {first}ul, in1);{WORDS}"
+        found = Lanes(rig, lanes)(body, [ray.ravel(), offset.ravel()], ["bits"] * 4, ray.size)
+        seen.append(np.hstack(found))
+    states = np.ascontiguousarray(np.vstack(seen)).view([("", np.uint32)] * 4)
+    shared = len(states) - len(np.unique(states))
+    demand(shared == 0, f"{shared} of {len(states)} samples share a stream")
+
+
+def extremes(rig: Rig, alpha: float, lanes: int) -> None:
+    """The smallest and largest bits: in [0, 1), and finite."""
+    # from s0 = 0 the generator returns s3 rotated by 7
+    body = "if (n == 0) { rng.s0 = (bits)0; rng.s1 = rng.s2 = (bits)1; rng.s3 = in0; }"
+    body += "Rng copy = rng; out0 = uniform(&rng); out1 = exponential(&copy);"
+    words = np.array([0, 0xFFFFFFFF, 1 << 1, 0xFE])
+    u, depth = Lanes(rig, lanes)(body, [words], ["real", "real"], 4)
+    exact = ((words << 7 | words >> 25) & 0xFFFFFFFF) >> 8
+    demand((u[:, 0] == exact * 2.0**-24).all(), f"uniforms {u[:, 0]}, expected {exact} x 2^-24")
+    demand(depth[0, 0] == 0.0, f"u = 0 gives the depth {depth[0, 0]}")
+    largest = 24.0 * np.log(2.0)
+    demand(abs(depth[1, 0] / largest - 1.0) < 1e-6, f"1 - 2^-24 gives {depth[1, 0]}")
+
+
+def distribution(rig: Rig, alpha: float, lanes: int) -> None:
+    """Sixteen million draws, with the whole of the exponential's tail."""
+    count, draws = 2**16, 2**8
+    body = f"if (n == 0) rng = stream({rig.seed}ul, in0, 0ul, in1);"
+    body += "Rng copy = rng; out0 = uniform(&rng); out1 = exponential(&copy);"
+    ray = np.arange(count)
+    u, depth = Lanes(rig, lanes)(body, [ray, ray % 7], ["real", "real"], count, draws)
+    demand(u.min() >= 0.0 and u.max() < 1.0, f"uniforms from {u.min()} to {u.max()}")
+    demand(np.isfinite(depth).all(), "an infinite optical depth")
+    total = count * draws
+    p_values = [stats.chisquare(np.histogram(u, 1024, (0.0, 1.0))[0]).pvalue]
+    # successive draws of a stream, and the same draw of neighbouring streams
+    for one, other in ((u[:, 1:], u[:, :-1]), (u[1:], u[:-1])):
+        correlation = np.corrcoef(one.ravel(), other.ravel())[0, 1]
+        p_values.append(2.0 * stats.norm.sf(abs(correlation) * np.sqrt(one.size)))
+    for limit in (1.0, 5.0, 10.0, 13.0, 16.0):
+        # -log(1 - u) of multiples of 2^-24 exceeds the limit this often, exactly
+        share = (np.ceil(np.exp(-limit) * 2.0**24) - 1) * 2.0**-24
+        excess = np.count_nonzero(depth > limit)
+        tails = stats.binom.cdf(excess, total, share), stats.binom.sf(excess - 1, total, share)
+        p_values.append(min(1.0, 2.0 * min(tails)))
+    require(np.array(p_values), alpha, "uniform, correlations (2), tail beyond 1, 5, 10, 13, 16")
+
+
+def twenty_free_paths(rig: Rig, alpha: float, lanes: int) -> None:
+    """P(X > 20) = 2e-9 as a sum of two depths: a path's depth, as collisions add them up."""
+    count, draws = 2**16, 2**8
+    body = f"if (n == 0) rng = stream({rig.seed}ul, in0, 1ul, in1);"
+    body += "out0 = exponential(&rng) + exponential(&rng) + exponential(&rng) + exponential(&rng);"
+    ray = np.arange(count)
+    (sums,) = Lanes(rig, lanes)(body, [ray, ray % 5], ["real"], count, draws)
+    beyond, total = np.count_nonzero(sums > 20.0), sums.size
+    share = stats.gamma.sf(20.0, 4)
+    tails = stats.binom.cdf(beyond, total, share), stats.binom.sf(beyond - 1, total, share)
+    p_value = np.array([min(1.0, 2.0 * min(tails))])
+    found, expected = np.array([beyond / total]), np.array([share])
+    require(p_value, alpha, "share beyond 20 mean free paths", found, expected)
+
+
+def never_1(rig: Rig, alpha: float, lanes: int) -> None:
+    """On the device: the largest of a hundred thousand draws of ten thousand streams."""
+    count, inner = 2**14, 2**16
+    body = f"""
+    rng = stream({rig.seed}ul, in0, 2ul, in1);
+    real most = (real)0;
+    for (uint i = 0; i < {inner}u; ++i) {{ const real u = uniform(&rng); most = larger(u, most); }}
+    out0 = most;"""
+    ray = np.arange(count)
+    (most,) = Lanes(rig, lanes)(body, [ray, ray % 3], ["real"], count)
+    demand(most.max() < 1.0, f"the largest of {count * inner} draws is {most.max()}")
+    demand(most.max() == 1.0 - 2.0**-24, "the largest uniform was not met in 1e9 draws")
+
+
+def logarithm(rig: Rig, lanes: int, name: str) -> None:
+    """All 2^24 values of 1 - u."""
+    k = np.arange(2**24, dtype=np.uint32)
+    body = "out0 = logarithm((SCALAR)1 - to_real(in0) * 0x1p-24f);"
+    (found,) = Lanes(rig, lanes, name)(body, [k], ["real"], len(k))
+    found = found[:, 0].astype(np.float64)
+    exact = np.log1p(-k.astype(np.float64) * 2.0**-24)
+    demand(found[0] == 0.0, f"the logarithm of 1 is {found[0]}")
+    ulp = np.spacing(np.abs(exact[1:]).astype(np.float32)).astype(np.float64)
+    error = np.max(np.abs(found[1:] - exact[1:]) / ulp)
+    demand(error <= ULP[name], f"off by {error:.3g} units in the last place")
+    demand((np.diff(found) <= 0.0).all(), "it falls where its argument rises")
+
+
+def ends(rig: Rig, alpha: float, tracker: Tracker, medium: str = "") -> None:
+    """Finite and within the ray, whatever is drawn; a path that goes on is cut off and counted."""
+    rig = rig.with_change(ENDS)
+    medium = medium or ("layered" if "closed_form" in tracker.needs else "trilinear")
+    axes: dict[str, Any] = {"estimand": tracker.estimands[-1], "tightness": 1.5}
+    rays = {"chords": {"count": 64}}
+    flight = fly(rig, tracker, medium, rays=rays, **axes)
+    demand(ENDS.planted, "the draws could not be replaced by the ends of their range")
+    samples = flight.record(512)
+    counted = samples.round.counters
+    demand(not counted["nonfinite"], f"{counted['nonfinite']} scores are no numbers")
+    demand(not counted["truncated"], f"{counted['truncated']} paths go on for ever")
+    demand((samples.t >= 0.0).all(), "a path that ends before it begins")
+    beyond = np.max(samples.t - flight.segments[:, 6:])
+    demand(beyond <= 1e-5, f"a path ends {beyond:.3g} beyond its ray")
+
+
+PARTS: dict[str, tuple[str, Body]] = {
+    "known-answers": (
+        "A swapped word or key makes a generator that only looks random.",
+        known_answers,
+    ),
+    "own-counters": ("Lanes that mix their counters draw the same numbers.", own_counters),
+    "published": ("A generator with another rotation fails tests only its authors ran.", published),
+    "streams": ("Sample numbers that wrap at 2^32 repeat the samples of a long run.", streams),
+    "disjoint": ("Samples that share a stream have errors that do not average out.", disjoint),
+    "extremes": ("u = 1 or log 0 is infinite, and 0 must be a depth of 0.", extremes),
+    "distribution": ("An epsilon in log(1 - u + eps) cuts the tail of free paths.", distribution),
+    "twenty-free-paths": ("A tail that is cut shows first far out.", twenty_free_paths),
+}

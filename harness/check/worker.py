@@ -1,0 +1,75 @@
+"""Runs checks one after the other in a process of its own, which may crash or hang."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+import traceback
+from collections.abc import Sequence
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from pathlib import Path
+
+from freepath import catalog
+from freepath.check import registry
+from freepath.check.model import LEVEL, Check
+from freepath.check.outcome import FAILED, PASSED, SKIPPED
+from freepath.check.rig import SEED, Rig
+from freepath.check.verdict import Failure, NotApplicable
+from freepath.device import open_devices
+from freepath.errors import FreepathError
+
+STRIDE = 1_000_003
+"""Between the seeds of repeats: more than the checks add to them."""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What a worker needs to know: which device, which trackers, which seed."""
+
+    device: str | None
+    """A selector, or None for the first."""
+    trackers: Sequence[Path] = ()
+    seed: int = SEED
+
+
+def serve(connection: Connection, setting: Setting) -> None:
+    """Answer each (check's name, repeat) with (status, seconds, text) until there are no more.
+
+    The first message is '' or why the device cannot be used.
+    """
+    with tempfile.TemporaryDirectory(prefix="freepath-check-") as folder:
+        try:
+            known = catalog.load(setting.trackers)
+            device = open_devices([setting.device] if setting.device else [])[0]
+            rig = Rig(device, known, Path(folder), setting.seed)
+        except FreepathError as error:
+            connection.send(str(error))
+            return
+        checks = {check.name: check for check in registry.checks(known)}
+        connection.send("")
+        while (task := connection.recv()) is not None:
+            name, repeat = task
+            connection.send(run(rig.with_seed(setting.seed + STRIDE * repeat), checks[name]))
+
+
+def run(rig: Rig, check: Check) -> tuple[str, float, str]:
+    """Run a check; returns its status, how many seconds it took, and what it has to say."""
+    started = time.perf_counter()
+    status, text = _verdict(rig, check)
+    return status, time.perf_counter() - started, text
+
+
+def _verdict(rig: Rig, check: Check) -> tuple[str, str]:
+    reason = check.applies(rig.device.info)
+    if reason:
+        return SKIPPED, reason
+    try:
+        check.run(rig, LEVEL)
+    except NotApplicable as error:
+        return SKIPPED, str(error)
+    except (Failure, FreepathError) as error:
+        return FAILED, str(error)
+    except Exception:
+        return FAILED, traceback.format_exc()
+    return PASSED, ""

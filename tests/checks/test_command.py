@@ -1,0 +1,181 @@
+"""`freepath check`: selection, text, files, exit codes, crashes and timeouts."""
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+import time
+from xml.etree import ElementTree
+
+import pytest
+from freepath.check import printing, session
+from freepath.check.model import Check
+from freepath.check.outcome import Outcome
+from freepath.check.pool import Pool, Task
+from freepath.check.worker import Setting
+from freepath.cli import main
+
+QUICK = "^hard/bad-input/(nan|negative|text)$"
+BROKEN = """/*---
+title: A tracker that forgets to look anything up
+estimands: [transmittance]
+needs: [majorant]
+---*/
+static void begin(Path *path, const Scene *scene, Rng *rng) { walk_begin(path, scene); }
+static void step(Path *path, const Scene *scene, Rng *rng) { escape(path, path->live); }
+"""
+
+
+@pytest.fixture
+def call(work, capsys):
+    def call(*arguments):
+        code = main(["check", *arguments])
+        captured = capsys.readouterr()
+        return code, captured.out, captured.err
+
+    return call
+
+
+def test_listed(call):
+    code, out, _ = call("-N", "-V", "-R", QUICK)
+    assert code == 0
+    assert re.search(r"Labels: fast hard bad-input\n  Test +#\d+: hard/bad-input/nan\n", out)
+    assert "refused" in out
+    assert out.endswith("Total Tests: 3\n")
+
+
+def test_passed(call, selector):
+    code, out, _ = call("-d", selector, "-R", QUICK, "-j", "2", "--output-junit", "junit.xml")
+    assert code == 0
+    assert re.search(r"^      Start +\d+: hard/bad-input/nan$", out, re.M)
+    assert re.search(
+        r"^3/3 Test +#\d+: hard/bad-input/\w+ \.+   Passed   +\d+\.\d\d sec$", out, re.M
+    )
+    assert "100% tests passed, 0 tests failed out of 3" in out
+    (suite,) = ElementTree.parse("junit.xml").getroot()
+    assert (suite.get("tests"), suite.get("failures")) == ("3", "0")
+
+
+@pytest.fixture
+def broken(tmp_path):
+    folder = tmp_path / "trackers"
+    folder.mkdir()
+    (folder / "broken.cl").write_text(BROKEN)
+    return str(folder)
+
+
+def test_failed_and_run_again(call, selector, broken):
+    """A tracker from elsewhere has the checks that its front matter calls for."""
+    arguments = ["-d", selector, "--trackers", broken]
+    wanted = "^identity/broken/transmittance/(homogeneous|linear)|^hard/bad-input/nan$"
+    code, out, err = call(
+        *arguments, "-R", wanted, "--output-on-failure", "--output-junit", "j.xml"
+    )
+    assert code == 8
+    assert "33% tests passed, 2 tests failed out of 3" in out
+    assert re.search(r"identity/broken/transmittance/linear/\w+ \.+\*\*\*Failed", out)
+    assert "times the bound" in out or "mean:" in out
+    assert re.search(r"The following tests FAILED:\n\t *\d+ - identity/broken/", out)
+    (suite,) = ElementTree.parse("j.xml").getroot()
+    assert suite.get("failures") == "2"
+    code, out, _ = call(*arguments, "--rerun-failed", "--stop-on-failure")
+    assert code == 8
+    assert "0% tests passed, 1 tests failed out of 1" in out
+    code, _, err = call("--rerun-failed", "-R", "nan")
+    assert (code, "no tests matched" in err) == (5, True)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "message"),
+    [
+        (["-R", "no such check"], 5, "no tests matched"),
+        (["-L", "("], 2, "expected a regular expression"),
+        (["-d", "no such device", "-R", "nan"], 2, "no OpenCL device matches"),
+        (["--rerun-failed"], 2, "no run before"),
+        (["--ctest", "/dev/null/x"], 2, "cannot be written"),
+    ],
+)
+def test_mistakes(call, arguments, code, message):
+    found, _, err = call(*arguments)
+    assert found == code
+    assert message in err
+
+
+@pytest.mark.parametrize("arguments", [["-j", "0"], ["--timeout", "0"], ["--seed", "-1"]])
+def test_wrong_numbers(call, arguments, capsys):
+    with pytest.raises(SystemExit) as stopped:
+        call(*arguments)
+    assert stopped.value.code == 2
+    assert "expected" in capsys.readouterr().err
+
+
+def test_repeated_with_fresh_seeds(call, selector):
+    arguments = ["-R", "^hard/random-numbers/disjoint/16", "--repeat", "3", "--seed", "5"]
+    code, out, _ = call("-d", selector, *arguments)
+    assert code == 0
+    assert "0 of 3 runs with fresh seeds raised an alarm" in out
+    assert "the budget is 0.001 a run" in out
+
+
+def test_too_many_alarms_are_told():
+    outcomes = [Outcome(1, "x", (), "Failed", 0.0, "", repeat) for repeat in range(5)]
+    assert session.false_alarms(outcomes, 50)[1]
+    assert not session.false_alarms(outcomes[:1], 1000)[1]
+
+
+def test_matrix():
+    text = printing.matrix(
+        {
+            "one": [Outcome(1, "x", (), "Passed", 0.0), Outcome(2, "y", (), "Failed", 0.0, "off")],
+            "two": [Outcome(1, "x", (), "Skipped", 0.0, "no doubles")],
+        }
+    )
+    assert "x      P -" in text
+    assert "y      F ?" in text
+    assert "no doubles: B x" in text
+
+
+@pytest.mark.skipif(not shutil.which("ctest"), reason="ctest is not installed")
+def test_ctest_runs_them(call, selector, tmp_path):
+    code, out, _ = call("--ctest", str(tmp_path / "c"), "-R", QUICK, "-d", selector)
+    assert code == 0
+    found = subprocess.run(
+        ["ctest", "-L", "bad-input", "-j", "2"],
+        cwd=tmp_path / "c",
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert "100% tests passed, 0 tests failed out of 3" in found.stdout
+    assert found.returncode == 0
+
+
+def crash(*_):
+    os.kill(os.getpid(), signal.SIGSEGV)
+
+
+def hang(*_):
+    time.sleep(60)
+
+
+@pytest.mark.parametrize(("doing", "status"), [(crash, "Crashed"), (hang, "Timeout")])
+def test_a_check_that_takes_its_process_with_it(monkeypatch, selector, doing, status):
+    """The others are run all the same, by another process."""
+    monkeypatch.setattr("freepath.check.pool._serve", serve_badly)
+    tasks = [
+        Task(i, Check(name, (), "", doing), 0) for i, name in enumerate([doing.__name__, "ok"])
+    ]
+    pool = Pool(Setting(selector), 1, 5.0, lambda task: None)
+    outcomes = {one.name: one for one in pool.outcomes(tasks)}
+    assert outcomes[doing.__name__].status == status
+    assert outcomes["ok"].status == "Passed"
+    if status == "Crashed":
+        assert "SIGSEGV" in outcomes["crash"].text
+
+
+def serve_badly(connection, setting):
+    connection.send("")
+    while (task := connection.recv()) is not None:
+        {"crash": crash, "hang": hang}.get(task[0], lambda: None)()
+        connection.send(("Passed", 0.0, ""))

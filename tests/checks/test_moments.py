@@ -1,0 +1,5 @@
+"""Variances and costs."""
+
+from checks.support import those
+
+test_check = those("moments/")
