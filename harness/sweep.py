@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from freepath import majorants, source
 from freepath.catalog import Catalog
+from freepath.confirm import confirmed_rows
 from freepath.device import Device, Program, scalar_type
 from freepath.errors import BuildError, FreepathError, RunError
 from freepath.majorants import Majorant
@@ -157,6 +158,8 @@ class Sweep:
     """Told every row once it is written."""
     on_progress: Callable[[float, str], None]
     """Told how many cases' worth is under way, and what is being done."""
+    confirm: bool = False
+    """Whether the error that a case predicts is measured as well."""
     time_build_s: float = 0.0
     _programs: dict[str, Program | BuildError] = field(default_factory=dict)
 
@@ -268,15 +271,21 @@ class Sweep:
         tracker = self.catalog.trackers[job.case.tracker]
         values, largest = scene.reference(estimand), scene.largest_score(estimand)
         row = measured_row(job.row, tracker, found, values, largest)
-        self._finish(job, row, round_rows(row, found))
+        confirmed = []
+        if self.confirm and row["status"] == "ok":
+            try:
+                confirmed = confirmed_rows(row, job.bench, values)
+            except RunError as error:
+                return self._fail(job, error)
+        return self._finish(job, row, round_rows(row, found), confirmed)
 
     def _fail(self, job: Job, error: FreepathError) -> None:
         """A case that cannot be built or run is a row; the others go on."""
         status = "build_failed" if isinstance(error, BuildError) else "run_failed"
         self._finish(job, job.row | {"status": status, "reason": first_error(error)})
 
-    def _finish(self, job: Job, row: dict[str, Any], rounds: Iterable[dict[str, Any]] = ()) -> None:
-        self.folder.append(row, rounds)
+    def _finish(self, job: Job, row: dict[str, Any], *further: Iterable[dict[str, Any]]) -> None:
+        self.folder.append(row, *further)
         self.on_done(row)
 
 

@@ -22,7 +22,7 @@ ORDER = (
     ("runner",),
     ("measure",),
     ("results",),
-    ("rows", "table"),
+    ("rows", "table", "confirm"),
     ("sweep", "report"),
     ("run", "arguments"),
     ("commands",),

@@ -18,6 +18,7 @@ from freepath.errors import FAILED, INTERRUPTED
 
 if TYPE_CHECKING:
     from freepath.plan import Case
+    from freepath.results import ResultFolder
     from freepath.run import Run
     from rich.console import Console
 
@@ -47,6 +48,12 @@ def add(commands: Any) -> None:
         help="go on with the run in DIR (default: the newest of this config): rows whose config, "
         "source, device and driver are unchanged are kept",
     )
+    run.add_argument(
+        "--confirm",
+        action="store_true",
+        help="measure the error of each case at three more sample counts, write it beside the "
+        "prediction into confirm.csv, and tell how many predictions hold",
+    )
     run.add_argument("--json", action="store_true", help="print the rows as JSON, nothing else")
 
 
@@ -56,17 +63,18 @@ def execute(options: Namespace) -> int:
     loaded, known, cases = cases_of(options)
     if options.show_only:
         return _show_only(options, cases)
-    from freepath import environment, run
+    from freepath import environment, run, table
     from freepath.device import open_devices
-    from freepath.results import ResultFolder, records
+    from freepath.results import records
 
     load = environment.load()
     devices = open_devices(options.device)
     path = options.output or (run.newest_folder if options.resume else run.new_folder)(loaded.name)
-    folder, clock = ResultFolder(path, resume=options.resume), run.Clock(started)
+    folder, clock = _folder(path, options), run.Clock(started)
     console = console_of(stderr=options.json)
     with _shown_progress(console) as (on_done, on_progress):
-        sweep = run.Run(loaded, known, cases, folder, clock, on_done, on_progress)
+        told = on_done, on_progress
+        sweep = run.Run(loaded, known, cases, folder, clock, *told, options.confirm)
         try:
             sweep.execute(devices)
         except KeyboardInterrupt:
@@ -78,9 +86,17 @@ def execute(options: Namespace) -> int:
     else:
         _print_tables(console, rows, load)
         _print_times(console, sweep)
+        if options.confirm:
+            console.print(table.confirmed(folder.confirmed()), highlight=False)
         for written in folder.paths():
             console.print(f"wrote {written}", highlight=False, markup=False, soft_wrap=True)
     return _say_failures(rows)
+
+
+def _folder(path: Path, options: Namespace) -> ResultFolder:
+    from freepath.results import ResultFolder
+
+    return ResultFolder(path, resume=options.resume, confirm=options.confirm)
 
 
 @contextmanager
