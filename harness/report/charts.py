@@ -126,6 +126,8 @@ def pareto(report: Report) -> alt.LayerChart:
         )
         .transform_joinaggregate(best="min(error)", groupby=["grid", "device"])
         .transform_filter("datum.error <= datum.best * 1.000001")
+        .transform_joinaggregate(first="min(t)", groupby=["grid", "device"])
+        .transform_filter("datum.t <= datum.first")
         .encode(x=_x("time:Q", TIME), y=_error_axis())
     )
     lines = base.mark_line(color="#888", strokeWidth=1.5).encode(strokeDash="device:N")
@@ -224,11 +226,12 @@ def confirm(report: Report) -> alt.LayerChart:
     base = alt.Chart(alt.NamedData("confirmed")).encode(
         x=_x("predicted:Q", "predicted relative RMSE")
     )
-    y = alt.Y("ratio:Q").scale(domain=[0.5, 1.5], clamp=True).title("measured / predicted")
+    near = alt.Scale(domain=[0.5, 1.5], clamp=True)
+    y = alt.Y("ratio:Q", scale=near, title="measured / predicted")
     marks = alt.Chart(alt.NamedData("confirmed")).mark_rule(color="#888", strokeDash=[4, 3])
-    rules = [marks.encode(y=alt.datum(value)) for value in (0.9, 1.0, 1.1)]
+    rules = [marks.encode(y=alt.datum(value, scale=near)) for value in (0.9, 1.0, 1.1)]
     intervals = base.mark_rule(opacity=0.5, clip=True).encode(
-        y=alt.Y("low:Q").scale(domain=[0.5, 1.5], clamp=True),
+        y=alt.Y("low:Q", scale=near),
         y2="high:Q",
         color=_colour(report),
     )

@@ -43,7 +43,7 @@ class Report:
 
 def load(results: Sequence[Path]) -> Report:
     """Read results; raises FreepathError where one of them cannot be read."""
-    report = Report()
+    report, known = Report(), []
     given = [(name, path, _summary(path)) for name, path in _named(results)]
     devices = _devices([(name, row) for name, _, rows in given for row in rows])
     for name, path, rows in given:
@@ -53,7 +53,7 @@ def load(results: Sequence[Path]) -> Report:
             record = _record(row, methods, devices[name, _device(row)])
             records[row["case_id"], row["device"], row["platform"]] = record
             report.rows.append(record)
-        report.confirmed += _confirmed(path, records)
+        known.append((path, records))
         report.runs.append({"name": name} | _facts(path))
     for question in report.values("q"):
         _span([row for row in report.measured if row["q"] == question])
@@ -62,6 +62,8 @@ def load(results: Sequence[Path]) -> Report:
     labels = {row["label"] for row in report.rows}
     for row in report.rows:
         row["colour"] = row["label"] if len(labels) <= COLOURS else row["tracker"]
+    for path, records in known:
+        report.confirmed += _confirmed(path, records)
     return report
 
 
