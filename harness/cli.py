@@ -11,20 +11,22 @@ from contextlib import contextmanager
 from typing import Any
 
 import shtab
-from freepath.commands import devices, listing, report, run, source
+from freepath.commands import compare, devices, listing, report, run, source
 from freepath.errors import FAILED, INTERRUPTED, FreepathError
 from freepath.version import __version__
 
 COMMANDS = {
     "run": run,
     "report": report,
+    "compare": compare,
     "source": source,
     "list": listing,
     "devices": devices,
 }
 
 EPILOG = """\
-exit codes: 0 fine; 2 usage or config; 5 nothing matched; 8 a case failed; 130 interrupted
+exit codes: 0 fine; 1 a regression; 2 usage or config; 5 nothing matched; 8 a case failed;
+130 interrupted
 
 examples:
   freepath run quick                        the sweep that ships for a first look
@@ -33,7 +35,8 @@ examples:
   freepath run my.yaml -R delta -E grid     only cases named delta, none named grid
   freepath run my.yaml -o out --resume      go on where an interrupted run stopped
   freepath list trackers                    what can be compared
-  freepath report out -o picture.png        its errors over device time, as a picture
+  freepath report out                       one HTML file of it, to look at
+  freepath compare before after             what became slower, noisier or different
   freepath source quick --case 3            the OpenCL C that case 3 runs
 """
 

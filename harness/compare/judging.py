@@ -16,6 +16,8 @@ VERDICTS = (
 )  # fmt: skip
 REGRESSIONS = ("SLOWER", "MORE_NOISE", "DIFFERENT", "MISSING")
 SMALLEST = np.finfo(float).tiny
+SAMPLE = ("seed", "rays", "driver_version", "lanes", "arithmetic")
+"""Where these are equal, both took the same samples: nothing is left to chance."""
 ROUNDING = 1e-6
 """Relative difference of estimates without variance that different compilers may cause."""
 
@@ -146,13 +148,12 @@ def _tests(
         found.append(_Test(key, "SLOWER", slower, "time"))
         found.append(_Test(key, "FASTER", faster, "time"))
     difference, z = _difference(before, after)
-    if _same_samples(before, after):
-        # the same samples: nothing is left to chance
+    if _equal(before, after, *SAMPLE, "counted_samples"):
         same = before["lookups_per_sample"] == after["lookups_per_sample"]
-        why = "lookups of the same samples"
-        found.append(_Test(key, "DIFFERENT", 1.0 if same else 0.0, why))
+        found.append(_Test(key, "DIFFERENT", float(same), "lookups of the same samples"))
+    if _equal(before, after, *SAMPLE, "samples_per_ray"):
         same = abs(difference) <= ROUNDING
-        found.append(_Test(key, "DIFFERENT", 1.0 if same else 0.0, "estimate of the same samples"))
+        found.append(_Test(key, "DIFFERENT", float(same), "estimate of the same samples"))
     elif z is None:
         found.append(_Test(key, "DIFFERENT", float(abs(difference) <= ROUNDING), "estimate"))
     else:
@@ -160,10 +161,8 @@ def _tests(
     return found
 
 
-def _same_samples(before: Row, after: Row) -> bool:
-    """Whether both took the same samples on the same device, so that they must agree exactly."""
-    exact = ("seed", "rays", "samples_per_ray", "counted_samples", "driver_version", "lanes")
-    return all(before[name] == after[name] for name in (*exact, "arithmetic"))
+def _equal(before: Row, after: Row, *columns: str) -> bool:
+    return all(before[name] == after[name] for name in columns)
 
 
 def _noise(
@@ -192,9 +191,8 @@ def _decide(judged: dict[Key, Judged], tests: list[_Test], alpha: float) -> None
     """Give each case the worst verdict that its corrected tests support."""
     if not tests:
         return
-    corrected = stats.false_discovery_control(
-        [max(t.p_value, SMALLEST) for t in tests], method="by"
-    )
+    p_values = [max(test.p_value, SMALLEST) for test in tests]
+    corrected = stats.false_discovery_control(p_values, method="by")
     worst = ("DIFFERENT", "SLOWER", "MORE_NOISE", "FASTER", "LESS_NOISE")
     for test, p_value in sorted(
         zip(tests, corrected, strict=True), key=lambda pair: -worst.index(pair[0].verdict)

@@ -27,6 +27,8 @@ class Run:
     """Seconds a sample by the number of the round; rounds of full size only."""
     variances: dict[Key, list[float]]
     host: dict[str, Any]
+    effects: dict[Key, Any] | None = None
+    """What timing.effects finds; kept, as it is asked for more than once."""
 
 
 @dataclass

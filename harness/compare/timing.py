@@ -64,6 +64,12 @@ def polished(table: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def effects(run: Run) -> dict[Key, tuple[Effect, Key]]:
     """The effect of each case of a run, and the scene that it is of."""
+    if run.effects is None:
+        run.effects = _effects(run)
+    return run.effects
+
+
+def _effects(run: Run) -> dict[Key, tuple[Effect, Key]]:
     found = {}
     for scene, keys in scenes(run).items():
         table = table_of([run.times[key] for key in keys])
@@ -99,7 +105,9 @@ def changes(reference: Side, contender: Side, drift: float) -> tuple[dict[Key, C
     """The change of each case that both sides measured, and the shift of each scene.
 
     What all cases of a scene shift together (a median) is taken out of them as far as it is less
-    than `drift`, a ratio: two runs of a machine differ by that much without a reason.
+    than `drift`, a ratio: two runs of a machine differ by that much without a reason. Where there
+    are too few runs to tell how far a case's times differ between them, the spread of the other
+    cases' changes tells it: a case is then judged as an outlier among them.
     """
     before, after = pooled(reference), pooled(contender)
     scene_of = {key: scene for run in reference.runs for key, (_, scene) in effects(run).items()}
@@ -118,31 +126,18 @@ def changes(reference: Side, contender: Side, drift: float) -> tuple[dict[Key, C
         known = len(keys) > 2
         taken = min(max(shift, -limit), limit) if known else 0.0
         further = (limit / 2) ** 2 if not known else 0.0
-        if known and not pooled_runs:
-            variances = np.array([before[k].variance + after[k].variance for k in keys])
-            further = between(ratios, variances)
-        for key, ratio in zip(keys, ratios, strict=True):
+        for place, (key, ratio) in enumerate(zip(keys, ratios, strict=True)):
+            if known and not pooled_runs:
+                further = float(np.delete(ratios, place).var(ddof=1))
             found[key] = _change(before[key], after[key], ratio - taken, further, len(keys))
     return found, shifts
-
-
-def between(ratios: np.ndarray, variances: np.ndarray) -> float:
-    """What cases change by from run to run without a reason, as a variance.
-
-    From the spread of all cases of a scene, most of which have not changed: a robust scale, less
-    what rounds explain of it.
-    """
-    scale = stats.median_abs_deviation(ratios, scale="normal")
-    # the median takes one of the cases' freedoms, which few of them feel
-    count = len(ratios)
-    return max(0.0, float(scale**2 * count / (count - 1) - np.median(variances)))
 
 
 def _change(before: Effect, after: Effect, ratio: float, further: float, cases: int) -> Change:
     """Welch's test, with what is known of the spread between runs added."""
     parts = [(before.variance, before.freedom), (after.variance, after.freedom)]
     if further:
-        parts.append((further, max(1.0, cases - 1.0)))
+        parts.append((further, max(1.0, cases - 2.0)))
     variance = sum(part for part, _ in parts)
     spread = sum(part**2 / freedom for part, freedom in parts if freedom > 0)
     freedom = variance**2 / spread if spread else 1.0

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import argparse
 import copy
-import dataclasses
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +26,7 @@ Plant = Callable[[Side, Key], None]
 def slowed(side: Side, key: Key, factor: float = 1.05) -> None:
     """Plant a slowdown into a case of a side, of every one of its rounds."""
     for run in side.runs:
+        run.effects = None
         run.times[key] = {n: factor * t for n, t in run.times[key].items()}
 
 
@@ -39,9 +40,7 @@ def biased(side: Side, key: Key, share: float = 0.01) -> None:
 
 def copied(name: str, runs: list[Run]) -> Side:
     """A side of these runs that can be changed without changing them."""
-    return Side(
-        name, [dataclasses.replace(r, rows=dict(r.rows), times=dict(r.times)) for r in runs]
-    )
+    return Side(name, [replace(run, rows=dict(run.rows), times=dict(run.times)) for run in runs])
 
 
 def trial(
