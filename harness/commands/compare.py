@@ -47,10 +47,10 @@ def add(commands: Any) -> None:
     compare.add_argument(
         "--drift",
         type=_ratio,
-        default=2.0,
         metavar="F",
         help="ratio by which all times of a scene may differ between runs of the machine without "
-        "a reason; what they differ by together is taken out up to that (default: 2)",
+        "a reason, to be taken out of each case (default: all of it, unless several runs on either "
+        "side show that it is no drift)",
     )
     compare.add_argument("--no-times", action="store_true", help="do not compare times")
     compare.add_argument("--all", action="store_true", help="print the cases that did not change")
@@ -141,7 +141,7 @@ def _print(options: Namespace, names: list[str], found: list) -> None:
     for name, (judged, shifts) in zip(names, found, strict=True):
         if len(names) == 1 and (options.all or any(one.verdict != "SAME" for one in judged)):
             console.print(showing.table(judged, everything=options.all))
-        for line in showing.shift_lines(shifts, options.drift):
+        for line in showing.shift_lines(shifts):
             console.print(line, highlight=False, markup=False)
         console.print(f"{name}: {showing.totals(judged)}", highlight=False, markup=False)
     if options.output:

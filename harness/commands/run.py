@@ -19,7 +19,7 @@ from freepath.errors import FAILED, INTERRUPTED
 if TYPE_CHECKING:
     from freepath.plan import Case
     from freepath.results import ResultFolder
-    from freepath.run import Run
+    from freepath.session import Run
     from rich.console import Console
 
 
@@ -63,18 +63,20 @@ def execute(options: Namespace) -> int:
     loaded, known, cases = cases_of(options)
     if options.show_only:
         return _show_only(options, cases)
-    from freepath import environment, run, table
+    from freepath import environment, session, table
     from freepath.device import open_devices
     from freepath.results import records
 
     load = environment.load()
     devices = open_devices(options.device)
-    path = options.output or (run.newest_folder if options.resume else run.new_folder)(loaded.name)
-    folder, clock = _folder(path, options), run.Clock(started)
+    path = options.output or (session.newest_folder if options.resume else session.new_folder)(
+        loaded.name
+    )
+    folder, clock = _folder(path, options), session.Clock(started)
     console = console_of(stderr=options.json)
     with _shown_progress(console) as (on_done, on_progress):
         told = on_done, on_progress
-        sweep = run.Run(loaded, known, cases, folder, clock, *told, options.confirm)
+        sweep = session.Run(loaded, known, cases, folder, clock, *told, options.confirm)
         try:
             sweep.execute(devices)
         except KeyboardInterrupt:

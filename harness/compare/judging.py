@@ -30,8 +30,9 @@ class Settings:
     """Expected share of false findings among all findings; where nothing changed, their chance."""
     factor: float = 1.01
     """Ratio of times, and of variances, that is too small to matter."""
-    drift: float = 2.0
-    """Ratio by which all times of a machine may differ between two runs without a reason."""
+    drift: float | None = None
+    """Ratio by which all times of a machine may differ between two runs without a reason; None to
+    judge that by the runs, where there are several, and else to take all of it for drift."""
     times: bool = True
     """Whether times are compared."""
 
@@ -71,13 +72,14 @@ class _Test:
 
 
 def compare(reference: Side, contender: Side, settings: Settings) -> tuple[list[Judged], dict]:
-    """Judge every case of either side; also returns the shift of each scene (logs).
+    """Judge every case of either side; also returns the shift of each scene.
 
-    The tests of all rows are corrected together by Benjamini and Yekutieli, which holds however
-    they depend on each other.
+    The tests of all rows are corrected together by Benjamini and Hochberg (1995).
     """
     before, after = reference.rows, contender.rows
-    timed, shifts = changes(reference, contender, settings.drift) if settings.times else ({}, {})
+    timed, shifts = {}, {}
+    if settings.times:
+        timed, shifts = changes(reference, contender, settings.drift, settings.alpha)
     judged: dict[Key, Judged] = {}
     tests: list[_Test] = []
     for key in dict.fromkeys([*before, *after]):
@@ -192,7 +194,7 @@ def _decide(judged: dict[Key, Judged], tests: list[_Test], alpha: float) -> None
     if not tests:
         return
     p_values = [max(test.p_value, SMALLEST) for test in tests]
-    corrected = stats.false_discovery_control(p_values, method="by")
+    corrected = stats.false_discovery_control(p_values)
     worst = ("DIFFERENT", "SLOWER", "MORE_NOISE", "FASTER", "LESS_NOISE")
     for test, p_value in sorted(
         zip(tests, corrected, strict=True), key=lambda pair: -worst.index(pair[0].verdict)

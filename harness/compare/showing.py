@@ -80,16 +80,16 @@ def totals(judged: Sequence[Judged]) -> str:
     return ", ".join(f"{counts[name]} {name}" for name in VERDICTS if counts[name])
 
 
-def shift_lines(shifts: dict[Any, float], drift: float) -> list[str]:
+def shift_lines(shifts: dict[Any, tuple[float, float]]) -> list[str]:
     """What all cases of a scene changed by together, where that is 2 % or more."""
     lines = []
-    for scene, shift in shifts.items():
-        if abs(shift) >= 0.02:
-            ratio = math.exp(shift)
-            taken = (
-                "taken out" if abs(shift) <= math.log(drift) else f"taken out up to {drift:g} only"
-            )
-            lines.append(f"{scene[2]}: all times together x{ratio:.3g}, {taken}")
+    for scene, (shift, taken) in shifts.items():
+        if abs(shift) < 0.02:
+            continue
+        line = f"{scene[2]}: all times together x{math.exp(shift):.3g}"
+        if taken:
+            line += f", of which x{math.exp(taken):.3g} is taken for a drift of the machine"
+        lines.append(line)
     return lines
 
 

@@ -15,10 +15,12 @@ import numpy as np
 from freepath.compare.pairing import Key, Run, Side, scenes, table_of
 from scipy import stats
 
-SWEEPS = 12
+SWEEPS = 6
 """Of the median polish; it settles within a few."""
 BATCHES = 10
 """Neighbouring passes are put together into so many batches, as what disturbs one lasts."""
+ALONE = 0.3
+"""Standard deviation of a change, in logs, where no other cases of the scene tell it."""
 LEAST_RUNS = 3
 """With so many runs on either side, runs are what is compared: they differ by more than rounds."""
 
@@ -49,17 +51,21 @@ class Change:
         return float(slower), float(faster)
 
 
-def polished(table: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Fit rows + columns to a table with NaN in it; returns row levels and what columns leave.
+def _medians(table: np.ndarray) -> np.ndarray:
+    """Medians along the last axis without NaN; numpy's own take a loop over rows for that."""
+    ordered, counts = np.sort(table, axis=-1), np.isfinite(table).sum(-1)
+    rows = np.arange(len(table))
+    return 0.5 * (ordered[rows, (counts - 1) // 2] + ordered[rows, counts // 2])
 
-    The second is the table less its columns' parts, so that each row varies about its level.
-    """
+
+def polished(table: np.ndarray) -> np.ndarray:
+    """A table (cases, passes), with NaN in it, less what passes have in common (passes)."""
     columns = np.zeros(table.shape[1])
     for _ in range(SWEEPS):
-        rows = np.nanmedian(table - columns, axis=1)
-        columns = np.nanmedian(table - rows[:, None], axis=0)
+        rows = _medians(table - columns)
+        columns = _medians((table - rows[:, None]).T)
         columns -= np.median(columns)
-    return np.nanmedian(table - columns, axis=1), table - columns
+    return table - columns
 
 
 def effects(run: Run) -> dict[Key, tuple[Effect, Key]]:
@@ -73,7 +79,7 @@ def _effects(run: Run) -> dict[Key, tuple[Effect, Key]]:
     found = {}
     for scene, keys in scenes(run).items():
         table = table_of([run.times[key] for key in keys])
-        adjusted = polished(table)[1] if len(keys) > 2 else table
+        adjusted = polished(table) if len(keys) > 2 else table
         for key, row in zip(keys, adjusted, strict=True):
             found[key] = _effect(row[np.isfinite(row)]), scene
     return found
@@ -87,25 +93,46 @@ def _effect(values: np.ndarray) -> Effect:
 
 
 def pooled(side: Side) -> dict[Key, Effect]:
-    """The effect of each case of a side, scene by scene less what all cases have in common."""
+    """The effect of each case of a side.
+
+    Of several runs its variance is that between them, less what all cases of a scene share.
+    """
     runs = [effects(run) for run in side.runs]
+    commons = [_commons(run) for run in runs]
     found = {}
     for key in {key for run in runs for key in run}:
-        given = [run[key][0] for run in runs if key in run]
-        levels = np.array([effect.level for effect in given])
+        given = [
+            (run[key][0], common[run[key][1]])
+            for run, common in zip(runs, commons, strict=True)
+            if key in run
+        ]
+        level = float(np.mean([effect.level for effect, _ in given]))
         if len(given) >= LEAST_RUNS:
-            found[key] = Effect(levels.mean(), levels.var(ddof=1) / len(given), len(given) - 1.0)
+            alone = np.array([effect.level - common for effect, common in given])
+            found[key] = Effect(level, float(alone.var(ddof=1)) / len(given), len(given) - 1.0)
         else:
-            variance = sum(effect.variance for effect in given) / len(given) ** 2
-            found[key] = Effect(levels.mean(), variance, sum(e.freedom for e in given))
+            variance = sum(effect.variance for effect, _ in given) / len(given) ** 2
+            found[key] = Effect(level, variance, sum(effect.freedom for effect, _ in given))
     return found
 
 
-def changes(reference: Side, contender: Side, drift: float) -> tuple[dict[Key, Change], dict]:
-    """The change of each case that both sides measured, and the shift of each scene.
+def _commons(run: dict[Key, tuple[Effect, Key]]) -> dict[Key, float]:
+    """The median level of each scene's cases; 0 where they are too few to have one in common."""
+    levels: dict[Key, list[float]] = {}
+    for effect, scene in run.values():
+        levels.setdefault(scene, []).append(effect.level)
+    return {scene: float(np.median(x)) if len(x) > 2 else 0.0 for scene, x in levels.items()}
 
-    What all cases of a scene shift together (a median) is taken out of them as far as it is less
-    than `drift`, a ratio: two runs of a machine differ by that much without a reason. Where there
+
+def changes(
+    reference: Side, contender: Side, drift: float | None, alpha: float
+) -> tuple[dict[Key, Change], dict[Key, tuple[float, float]]]:
+    """The change of each case that both sides measured; and of each scene its shift, in logs.
+
+    A shift is what all cases of a scene change by together (a median), and how much of it was taken
+    out of them. Two single runs cannot tell a drift of the machine from a change of all cases:
+    then all of it is taken out, or as much as the ratio `drift` where that is given. With
+    LEAST_RUNS on either side it is taken out unless it is significant among the runs. Where there
     are too few runs to tell how far a case's times differ between them, the spread of the other
     cases' changes tells it: a case is then judged as an outlier among them.
     """
@@ -116,28 +143,38 @@ def changes(reference: Side, contender: Side, drift: float) -> tuple[dict[Key, C
         if key in after and key in scene_of:
             members.setdefault(scene_of[key], []).append(key)
     found, shifts = {}, {}
-    pooled_runs = min(len(reference.runs), len(contender.runs)) >= LEAST_RUNS
+    several = min(len(reference.runs), len(contender.runs)) >= LEAST_RUNS
     for scene, keys in members.items():
         ratios = np.array([after[key].level - before[key].level for key in keys])
-        shift = float(np.median(ratios))
-        shifts[scene] = shift
-        limit = math.log(drift)
-        # of one or two cases nothing tells the machine from the case: the drift is uncertainty
-        known = len(keys) > 2
-        taken = min(max(shift, -limit), limit) if known else 0.0
-        further = (limit / 2) ** 2 if not known else 0.0
+        shift = taken = float(np.median(ratios))
+        if drift is not None:
+            taken = min(max(shift, -math.log(drift)), math.log(drift))
+        elif several and _shifted(reference, contender, keys) <= alpha / len(members):
+            taken = 0.0
+        shifts[scene] = shift, taken
         for place, (key, ratio) in enumerate(zip(keys, ratios, strict=True)):
-            if known and not pooled_runs:
-                further = float(np.delete(ratios, place).var(ddof=1))
-            found[key] = _change(before[key], after[key], ratio - taken, further, len(keys))
+            spread = 0.0
+            if not several:
+                others = np.delete(ratios, place)
+                spread = float(others.var(ddof=1)) if len(others) > 1 else ALONE**2
+            found[key] = _change(before[key], after[key], ratio - taken, spread, len(keys))
     return found, shifts
 
 
-def _change(before: Effect, after: Effect, ratio: float, further: float, cases: int) -> Change:
-    """Welch's test, with what is known of the spread between runs added."""
+def _shifted(reference: Side, contender: Side, keys: list[Key]) -> float:
+    """The p-value that runs of both sides are equally fast, over all these cases."""
+    levels = [
+        [np.median([e[key][0].level for key in keys if key in e]) for e in map(effects, side.runs)]
+        for side in (reference, contender)
+    ]
+    return float(stats.ttest_ind(*levels, equal_var=False, nan_policy="omit").pvalue)
+
+
+def _change(before: Effect, after: Effect, ratio: float, others: float, cases: int) -> Change:
+    """Welch's test; or against the variance of the `others`' changes, if that is larger."""
     parts = [(before.variance, before.freedom), (after.variance, after.freedom)]
-    if further:
-        parts.append((further, max(1.0, cases - 2.0)))
+    if others * cases / max(1, cases - 1) > before.variance + after.variance:
+        parts = [(others * cases / max(1, cases - 1), max(1.0, cases - 2.0))]
     variance = sum(part for part, _ in parts)
     spread = sum(part**2 / freedom for part, freedom in parts if freedom > 0)
     freedom = variance**2 / spread if spread else 1.0

@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 from freepath.compare.judging import Settings, compare
 from freepath.compare.pairing import Key, Run, Side, load
+from freepath.compare.timing import effects
 from scipy import stats
 
 Plant = Callable[[Side, Key], None]
@@ -64,6 +65,8 @@ def rate(
 ) -> tuple[int, float, float]:
     """How many tries found something, and the 95 % interval of their share (Clopper, Pearson)."""
     random = np.random.default_rng(2024)
+    for run in runs:
+        effects(run)  # kept with it, and so with its copies
     found = sum(trial(runs, k, random, settings, plant) for _ in range(tries))
     low, high = stats.binomtest(found, tries).proportion_ci(0.95)
     return found, float(low), float(high)
