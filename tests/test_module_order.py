@@ -131,5 +131,5 @@ def test_a_wrong_import_would_be_found(tmp_path):
     wrong = tmp_path / "errors.py"
     wrong.write_text("def f():\n    from freepath.device import Device\n")
     assert list(own_imports(wrong)) == [("device", 2)]
-    wrong.write_text("import freepath.cli\nfrom freepath import run, __version__\n")
-    assert list(own_imports(wrong)) == [("cli", 1), ("run", 2), ("__init__", 2)]
+    wrong.write_text("import freepath.cli\nfrom freepath import session, __version__\n")
+    assert list(own_imports(wrong)) == [("cli", 1), ("session", 2), ("__init__", 2)]

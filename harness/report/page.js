@@ -22,13 +22,13 @@
   const signed = (row) => row.bias === null ? "" :
     `${row.bias < 0 ? "" : "+"}${short(100 * row.bias)}${row.bias_width ? "±" + Number((100 * row.bias_width).toPrecision(2)) : ""}%`;
   const columns = [
-    ["case", "method", (row) => row.method, true], ["medium", "q", (row) => row.q, true],
-    ["device", "device", (row) => row.device, true], ["lanes", "lanes", (row) => row.lanes],
+    ["case", "method", (row) => row.method, true], ["lanes", "lanes", (row) => row.lanes],
     ["arithmetic", "arithmetic", (row) => row.arithmetic, true], ["lookups", "lookups", (row) => short(row.lookups)],
     ["time", "t", (row) => seconds(row.t)], ["occ.", "occupancy", (row) => percent(row.occupancy)],
     ["rel. var.", "v", (row) => short(row.v)], ["bias", "bias", signed],
     ["to 10 %", "t10", (row) => seconds(row.t10)], ["to 1 %", "t1", (row) => seconds(row.t1)],
-    ["to 0.1 %", "t01", (row) => seconds(row.t01)], ["status", "status", (row) => row.status, true],
+    ["to 0.1 %", "t01", (row) => seconds(row.t01)], ["medium", "q", (row) => row.q, true],
+    ["device", "device", (row) => row.device, true], ["status", "status", (row) => row.status, true],
   ].filter(([, field]) => !["device", "arithmetic", "q", "status"].includes(field) || new Set(rows.map((row) => row[field])).size > 1);
 
   const options = (id, field, all) => {
@@ -130,6 +130,12 @@
     figure.querySelector("figcaption").textContent = values.length < total
       ? `The ${values.length} cases of ${total} that reach 1 % soonest; filter to see others.` : "";
     views[name]?.finalize();
+    if (!values.length) {
+      delete views[name];
+      figure.querySelector(".chart").replaceChildren();
+      figure.querySelector("figcaption").textContent = "No case matches.";
+      return;
+    }
     const spec = { ...trimmed(chart.spec, values), config: theme(), datasets: { [source]: values }, autosize: { type: "fit-x", contains: "padding" } };
     const rowed = { occupancy: "colour", devices: "method" }[name];
     if (rowed) spec.height = 22 * Math.max(1, new Set(values.map((row) => row[rowed])).size);
