@@ -205,9 +205,12 @@ def test_the_page(result, opened):
     page.evaluate("freepathReady()")
     box = page.locator("#figure-cost canvas").bounding_box()
     tip = page.locator("#vg-tooltip-element.visible")
-    for share in (0.1, 0.2, 0.3, 0.4, 0.5):
-        page.mouse.move(box["x"] + share * box["width"], box["y"] + 0.3 * box["height"])
-        page.wait_for_timeout(200)
+    for place in range(40):
+        down = 0.25 + 0.15 * (place % 4)
+        page.mouse.move(
+            box["x"] + (0.1 + place / 80) * box["width"], box["y"] + down * box["height"]
+        )
+        page.wait_for_timeout(60)
         if tip.count():
             break
     assert "delta, global x" in tip.inner_text()

@@ -51,8 +51,9 @@ def _colour(report: Report) -> alt.Color:
 
 
 def _hover() -> alt.Parameter:
+    # not `nearest`: Vega-Lite's tooltip then has no names, only numbers
     return alt.selection_point(
-        name="hover", on="pointerover", nearest=True, fields=["id"], empty=False, clear="pointerout"
+        name="hover", on="pointerover", fields=["id"], empty=False, clear="pointerout"
     )
 
 
@@ -81,11 +82,12 @@ def cost(report: Report) -> alt.LayerChart:
         strokeWidth=alt.condition(hover, alt.value(4), alt.value(1.6)),
     )
     near = (
-        base.mark_point(filled=True, size=36)
+        base.mark_point(filled=True)
         .encode(
             y=_error_axis(),
             color=_colour(report),
             opacity=alt.condition("datum.grid == 0", alt.value(1), alt.value(0)),
+            size=alt.condition("datum.grid == 0", alt.value(36), alt.value(150)),
             tooltip=[
                 *CASE,
                 alt.Tooltip("time:Q", title=TIME, format=".3~e"),
