@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from typing import Any
 
 import shtab
-from freepath.commands import check, devices, listing, report, run, source
+from freepath.commands import check, compare, devices, listing, report, run, source
 from freepath.errors import FAILED, INTERRUPTED, FreepathError
 from freepath.version import __version__
 
@@ -19,13 +19,15 @@ COMMANDS = {
     "run": run,
     "check": check,
     "report": report,
+    "compare": compare,
     "source": source,
     "list": listing,
     "devices": devices,
 }
 
 EPILOG = """\
-exit codes: 0 fine; 2 usage or config; 5 nothing matched; 8 a case or check failed; 130 interrupted
+exit codes: 0 fine; 1 a regression; 2 usage or config; 5 nothing matched; 8 a case or check
+failed; 130 interrupted
 
 examples:
   freepath run quick                        the sweep that ships for a first look
@@ -34,7 +36,8 @@ examples:
   freepath run my.yaml -R delta -E grid     only cases named delta, none named grid
   freepath run my.yaml -o out --resume      go on where an interrupted run stopped
   freepath list trackers                    what can be compared
-  freepath report out -o picture.png        its errors over device time, as a picture
+  freepath report out                       one HTML file of it, to look at
+  freepath compare before after             what became slower, noisier or different
   freepath check -L fast -j 2               does this device compute what it should?
   freepath source quick --case 3            the OpenCL C that case 3 runs
 """

@@ -88,7 +88,7 @@ class Measurement:
 
     def add(self, one: Round) -> None:
         """Add a measured round; its moments are kept merged only, or they would fill the memory."""
-        self.rounds.append(replace(one, moments=None))
+        self.rounds.append(replace(one, moments=None, means=None))
         self.spent_s += one.time_wall_s
         self.moments = self.moments.merged(one.moments) if self.moments else one.moments
 

@@ -12,8 +12,8 @@ from typing import Any
 
 from freepath.errors import FreepathError
 
-SCHEMA_VERSION = 1
-SUMMARY, SAMPLES, RUN = "summary.csv", "samples.csv", "run.json"
+SCHEMA_VERSION = 2
+SUMMARY, SAMPLES, CONFIRM, RUN = "summary.csv", "samples.csv", "confirm.csv", "run.json"
 LOCK = ".lock"
 # fmt: off
 COLUMNS = (
@@ -28,7 +28,8 @@ COLUMNS = (
     "source_bytes", "binary_bytes", "lookups_per_s",
     "estimate", "reference", "bias", "bias_stderr", "bias_rms", "z_score",
     "variance", "variance_noise", "rmse",
-    "inv_efficiency_lookups", "inv_efficiency_s", "time_to_1pct_s",
+    "inv_efficiency_lookups", "inv_efficiency_s",
+    "time_to_10pct_s", "time_to_1pct_s", "time_to_0.1pct_s",
     "truncated", "nonfinite", "violations", "counted_samples",
     "source_sha256", "config_sha256",
 )
@@ -36,6 +37,11 @@ SAMPLE_COLUMNS = (
     "schema_version", "run_id", "case_id", "device", "platform", "round",
     "samples", "first_sample_of_ray", "time_device_s", "time_wall_s", "iterations",
     "estimate", "variance",
+)
+CONFIRM_COLUMNS = (
+    "schema_version", "run_id", "case_id", "case", "device", "platform",
+    "estimand", "medium", "tracker", "reference", "rays", "samples_per_ray", "repeats",
+    "time_s", "rmse_predicted", "rmse_measured", "rmse_low", "rmse_high",
 )
 TEXTS = frozenset((
     "run_id", "case_id", "case", "status", "reason", "device", "platform", "driver_version",
@@ -60,18 +66,20 @@ Row = dict[str, str]
 class ResultFolder:
     """Writes a run's files; every row is on the disk as soon as its case is done."""
 
-    def __init__(self, folder: Path, *, resume: bool = False):
+    def __init__(self, folder: Path, *, resume: bool = False, confirm: bool = False):
         """Look at the folder without touching it; `open` makes it ready to be written to.
 
+        With `confirm`, a row that was measured stands only if its prediction was confirmed.
         Raises FreepathError if it holds a run and must not, or does not and must.
         """
         self.folder = folder
         self._resume = resume
+        self._confirm = confirm
         self._lock: Any = None
         try:
             if folder.exists() and not folder.is_dir():
                 raise FreepathError(f"{folder}: is a file, expected a folder for the results")
-            holds = [name for name in (SUMMARY, SAMPLES, RUN) if (folder / name).exists()]
+            holds = [name for name in (SUMMARY, SAMPLES, CONFIRM, RUN) if (folder / name).exists()]
         except OSError as error:
             raise FreepathError(f"{folder}: cannot be looked into: {error.strerror}") from error
         if resume and SUMMARY not in holds:
@@ -91,17 +99,24 @@ class ResultFolder:
         wanted, places = {key_of(row) for row in planned}, {_of(row, PLACE) for row in planned}
 
         def stands(row: Row) -> bool:
-            return key_of(row) in wanted and row["status"] in FINAL
+            confirmed = needed is None or row["status"] != "ok" or _of(row, SESSION) in needed
+            return key_of(row) in wanted and row["status"] in FINAL and confirmed
 
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
             self._acquire()
             old = self.rows() if self._resume else []
+            predicted = self._old(CONFIRM, CONFIRM_COLUMNS)
+            needed = {_of(row, SESSION) for row in predicted} if self._confirm else None
             kept = [row for row in old if stands(row) or _of(row, PLACE) not in places]
             sessions = {_of(row, SESSION) for row in kept}
-            rounds = [row for row in self._rounds() if _of(row, SESSION) in sessions]
+            rounds = self._old(SAMPLES, SAMPLE_COLUMNS)
             self._rewrite(SUMMARY, COLUMNS, kept)
+            rounds = [row for row in rounds if _of(row, SESSION) in sessions]
             self._rewrite(SAMPLES, SAMPLE_COLUMNS, rounds)
+            if predicted or self._confirm:
+                stay = [row for row in predicted if _of(row, SESSION) in sessions]
+                self._rewrite(CONFIRM, CONFIRM_COLUMNS, stay)
         except OSError as error:
             raise FreepathError(f"{self.folder}: cannot be written to: {error.strerror}") from error
         return {key_of(row) for row in kept if stands(row)}
@@ -127,9 +142,10 @@ class ResultFolder:
             (self.folder / LOCK).unlink(missing_ok=True)
             self._lock.release()
 
-    def _rounds(self) -> list[Row]:
-        samples = self.folder / SAMPLES
-        return read_rows(samples, SAMPLE_COLUMNS) if self._resume and samples.exists() else []
+    def _old(self, name: str, columns: tuple[str, ...]) -> list[Row]:
+        """The rows of a file of the run that is gone on with."""
+        path = self.folder / name
+        return read_rows(path, columns) if self._resume and path.exists() else []
 
     def _rewrite(self, name: str, columns: tuple[str, ...], rows: list[Row]) -> None:
         """Replace a file in one step, so that an interruption leaves the old or the new one."""
@@ -140,9 +156,16 @@ class ResultFolder:
             _flush(file)
         os.replace(temporary, self.folder / name)
 
-    def append(self, row: Mapping[str, Any], rounds: Iterable[Mapping[str, Any]] = ()) -> None:
+    def append(
+        self,
+        row: Mapping[str, Any],
+        rounds: Iterable[Mapping[str, Any]] = (),
+        confirmed: Iterable[Mapping[str, Any]] = (),
+    ) -> None:
         """Write a case's row and, before it, those of its rounds; both are on the disk then."""
         self._append(SAMPLES, SAMPLE_COLUMNS, rounds)
+        if self._confirm:
+            self._append(CONFIRM, CONFIRM_COLUMNS, confirmed)
         self._append(SUMMARY, COLUMNS, [row])
 
     def _append(self, name: str, columns: tuple[str, ...], rows: Iterable[Mapping]) -> None:
@@ -182,9 +205,14 @@ class ResultFolder:
         """All rows so far, as they stand in the file."""
         return read_rows(self.folder / SUMMARY)
 
+    def confirmed(self) -> list[Row]:
+        """Predicted and measured errors so far."""
+        return read_rows(self.folder / CONFIRM, CONFIRM_COLUMNS)
+
     def paths(self) -> list[Path]:
         """The files of the run."""
-        return [self.folder / name for name in (SUMMARY, SAMPLES, RUN)]
+        names = (SUMMARY, SAMPLES, *([CONFIRM] if self._confirm else []), RUN)
+        return [self.folder / name for name in names]
 
 
 def _writer(file: Any, columns: tuple[str, ...]) -> csv.DictWriter:

@@ -17,6 +17,8 @@ from freepath.stats import Accuracy, accuracy, relative_half_width
 
 ROUNDING = {"strict": 1e-3, "fast": 1e-3, "double": 1e-9}
 """Relative bias that an arithmetic may be excused for; far above what it costs."""
+LADDER = {"time_to_10pct_s": 0.1, "time_to_1pct_s": 0.01, "time_to_0.1pct_s": 0.001}
+"""Columns of the accuracy ladder, with the relative RMSE of each."""
 
 
 def base_row(case: Case, device: DeviceInfo, run_id: str) -> dict[str, Any]:
@@ -128,7 +130,7 @@ def _errors(result: Accuracy, found: Measurement, row: dict[str, Any]) -> dict[s
         "rmse": result.rmse,
         "inv_efficiency_lookups": result.variance * row["lookups_per_sample"],
         "inv_efficiency_s": result.variance * seconds,
-        "time_to_1pct_s": result.time_to(0.01, seconds),
+        **{name: result.time_to(error, seconds) for name, error in LADDER.items()},
     }
 
 

@@ -74,6 +74,9 @@ class Round:
     timing_source: str
     moments: Moments | None
     """Per ray; let go of once it is merged with those of other rounds."""
+    means: np.ndarray | None = None
+    """(blocks, rays) or (blocks, rays, channels): the mean of each block of samples; let go of like
+    the moments."""
     recorded: np.ndarray | None = None
     """(units, samples, 3 + 2 channels): t, weight, escaped, lookups so far in the unit, score; then
     weight and score of each further channel."""
@@ -193,7 +196,10 @@ class Runner:
             iterations += int(self._read("iterations", outputs, (work_items[0],), np.uint64).sum())
             first = end
         time_wall = time.perf_counter() - started
-        moments = self._moments(outputs, blocks, samples)
+        means, m2 = self._moments(outputs, blocks)
+        moments = merge_blocks(means, m2, samples)
+        moments = moments.flat if self.channels == 1 else moments.of_channels
+        means = means[..., 0] if self.channels == 1 else means[..., :-1]
         counters = self._read("counters", outputs, (units, len(COUNTERS)), np.uint32)
         recorded = None
         if record:
@@ -211,6 +217,7 @@ class Runner:
             time_wall_s=time_wall,
             timing_source="device" if time_device > 0 else "wall",
             moments=moments,
+            means=means,
             recorded=recorded,
         )
 
@@ -255,13 +262,12 @@ class Runner:
         }
         return {name: self.data.output(name, size) for name, size in sizes.items()}
 
-    def _moments(self, outputs: Outputs, blocks: int, samples: int) -> Moments:
-        """The moments of each ray; a unit's mean comes in two parts, mean less excess."""
+    def _moments(self, outputs: Outputs, blocks: int) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and m2 (blocks, rays, tallied); a unit's mean comes in two parts, less excess."""
         shape = (blocks, self.rays, self._tallied, 3)
         parts = self._read("moments", outputs, shape, self._scalar)
         mean, excess, m2 = np.moveaxis(parts.astype(np.float64), -1, 0)
-        moments = merge_blocks(mean - excess, m2, samples)
-        return moments.flat if self.channels == 1 else moments.of_channels
+        return mean - excess, m2
 
     def _read(
         self, name: str, outputs: Outputs, shape: tuple, dtype: np.dtype | type

@@ -9,6 +9,7 @@ from typing import Any
 from freepath import limits, majorants, source
 from freepath.binding import Scene, runner_of, structure_of
 from freepath.catalog import Catalog
+from freepath.confirm import confirmed_rows
 from freepath.device import Device, Program
 from freepath.errors import BuildError, DriverLimitError, FreepathError, RunError
 from freepath.measure import Bench, interleave
@@ -47,6 +48,8 @@ class Sweep:
     """Told every row once it is written."""
     on_progress: Callable[[float, str], None]
     """Told how many cases' worth is under way, and what is being done."""
+    confirm: bool = False
+    """Whether the error that a case predicts is measured as well."""
     time_build_s: float = 0.0
     _programs: dict[str, Program | BuildError] = field(default_factory=dict)
 
@@ -164,7 +167,13 @@ class Sweep:
         values = scene.reference(job.case)
         largest = scene.largest_score(job.case.estimand)
         row = measured_row(job.row, tracker, found, values, largest)
-        self._finish(job, row, round_rows(row, found))
+        confirmed = []
+        if self.confirm and row["status"] == "ok" and values is not None:
+            try:
+                confirmed = confirmed_rows(row, job.bench, values)
+            except RunError as error:
+                return self._fail(job, error)
+        return self._finish(job, row, round_rows(row, found), confirmed)
 
     def _fail(self, job: Job, error: FreepathError) -> None:
         """A case that cannot be built or run is a row; the others go on."""
@@ -173,8 +182,8 @@ class Sweep:
             status = "skipped"
         self._finish(job, job.row | {"status": status, "reason": first_error(error)})
 
-    def _finish(self, job: Job, row: dict[str, Any], rounds: Iterable[dict[str, Any]] = ()) -> None:
-        self.folder.append(row, rounds)
+    def _finish(self, job: Job, row: dict[str, Any], *further: Iterable[dict[str, Any]]) -> None:
+        self.folder.append(row, *further)
         self.on_done(row)
 
 

@@ -11,6 +11,8 @@ from rich.table import Table
 
 Row = dict[str, str]
 PREFIXES = ((1e-12, "p"), (1e-9, "n"), (1e-6, "u"), (1e-3, "m"), (1.0, ""))
+CLOSE = 0.1
+"""A prediction that is no further from the measurement, relative to it, holds."""
 FAILED = ("invalid", "build_failed", "run_failed", "timeout", "crashed", "mismatch")
 """Statuses of cases that went wrong."""
 LEGEND = (
@@ -152,6 +154,33 @@ def _cells(row: Row, *, best: bool) -> list[str]:
 def _bounces(row: Row) -> str:
     count = row["scatterings"]
     return f"{count} scattering" if count == "1" else f"{count} scatterings"
+
+
+def off(row: Row) -> float:
+    """How far a row's prediction of confirm.csv is from what was measured, relative to that."""
+    predicted, measured = (number(row, f"rmse_{what}") for what in ("predicted", "measured"))
+    if predicted is None:
+        return math.inf
+    return abs(predicted / measured - 1.0) if measured else math.inf if predicted else 0.0
+
+
+def confirmed(rows: Iterable[Row]) -> str:
+    """How many cases predicted their error at all sample counts, by the rows of confirm.csv."""
+    cases: dict[tuple[str, ...], list[Row]] = defaultdict(list)
+    for row in rows:
+        cases[row["device"], row["platform"], row["case_id"]].append(row)
+    wide = [one for one in cases.values() if not all(map(_settled, one))]
+    good = [one for one in cases.values() if max(map(off, one)) <= CLOSE]
+    return (
+        f"prediction within {100 * CLOSE:.0f} % for {len(good)} of {len(cases)} cases; "
+        f"of {len(wide)} the measured error itself is not known to {100 * CLOSE:.0f} %"
+    )
+
+
+def _settled(row: Row) -> bool:
+    """Whether the interval of the measured error is narrow enough to judge a prediction by."""
+    low, measured, high = (number(row, f"rmse_{what}") for what in ("low", "measured", "high"))
+    return high - measured <= CLOSE * measured and measured - low <= CLOSE * measured
 
 
 def table_of(rows: list[Row]) -> Table:

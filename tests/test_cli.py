@@ -54,7 +54,7 @@ def test_help(call, words):
     assert code == 0
     assert out.startswith("usage: freepath")
     if not words:
-        assert "exit codes: 0 fine; 2 usage or config; 5 nothing matched; 8 a case or" in out
+        assert "exit codes: 0 fine; 1 a regression; 2 usage or config; 5 nothing matched" in out
         for name in ("run", "list", "devices", "source"):
             assert re.search(rf"^ +{name} +\w", out, re.MULTILINE)
 

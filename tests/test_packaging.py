@@ -45,7 +45,11 @@ def wheel(tmp_path_factory):
 
 def expected():
     """What must be in it, by the checkout."""
-    suffixes = {"harness": {".py"}, "kernels": {".cl", ".py"}, "configs": {".yaml", ".json", ".py"}}
+    suffixes = {
+        "harness": {".py", ".html", ".css", ".js"},
+        "kernels": {".cl", ".py"},
+        "configs": {".yaml", ".json", ".py"},
+    }
     return {
         f"{FOLDERS[name]}/{path.relative_to(ROOT / name).as_posix()}"
         for name in FOLDERS
@@ -66,6 +70,7 @@ def test_nothing_else_is_in_the_wheel(wheel):
 def test_something_of_each_kind_is_expected():
     for name in (
         "freepath/cli.py",
+        "freepath/report/page.js",
         "freepath/scene/grid.py",
         "freepath/kernels/main.cl",
         "freepath/kernels/trackers/delta.cl",

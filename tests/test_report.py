@@ -1,12 +1,20 @@
+"""Reports: their numbers, their formats, and the page in a real browser."""
+
+import csv
+import json
 import math
+import shutil
+import time
 
 import pytest
-from freepath import report
 from freepath.cli import main
-from freepath.errors import FreepathError
-from freepath.results import COLUMNS
+from freepath.report import load, write
+from freepath.report.text import markdown
+from freepath.results import COLUMNS, CONFIRM_COLUMNS
 
+EVIL = "</script><script>alert(1)</script><b>`|"
 ROW = dict.fromkeys(COLUMNS, "") | {
+    "case_id": "1",
     "case": "transmittance/cloud-64/global/t1/delta/auto/strict",
     "status": "ok",
     "device": "a [b] <c>",
@@ -19,47 +27,254 @@ ROW = dict.fromkeys(COLUMNS, "") | {
     "tracker": "delta",
     "arithmetic": "strict",
     "lanes": "16",
+    "rays": "64",
     "time_per_sample_s": "1e-06",
+    "lookups_per_sample": "5.0",
+    "lane_occupancy": "0.9",
+    "time_noise": "0.02",
+    "variance_noise": "0.02",
     "reference": "0.5",
     "variance": "0.25",
-    "bias_rms": "0",
+    "bias": "0.0",
+    "bias_stderr": "0.001",
+    "bias_rms": "0.0",
+    "time_to_10pct_s": "0.0001",
+    "time_to_1pct_s": "0.01",
+    "time_to_0.1pct_s": "inf",
 }
 
 
-def test_a_curve_is_the_accuracy_ladder():
-    points = report.curve(ROW, 1e-2)
-    assert points[0] == {"time_s": 1e-6, "error": 1.0, "samples": 1.0}
-    assert points[-1]["time_s"] == pytest.approx(1e-2)
-    assert points[-1]["error"] == pytest.approx(1.0 / math.sqrt(1e4))
+def row_of(number, tracker, tightness=1.0, seconds=1e-6, **changes):
+    case = f"transmittance/cloud-64/global/t{tightness:g}/{tracker}/auto/strict"
+    row = ROW | {"case_id": str(number), "case": case, "tracker": tracker}
+    row |= {"tightness": str(tightness), "time_per_sample_s": str(seconds)}
+    return row | {"time_to_1pct_s": str(1e4 * seconds)} | changes
 
 
-def test_a_bias_makes_a_curve_level():
-    points = report.curve(ROW | {"bias_rms": "0.05"}, 10.0)
-    assert points[-1]["error"] == pytest.approx(0.1, rel=1e-3)
+def result_of(folder, rows, confirmed=()):
+    folder.mkdir(exist_ok=True)
+    for name, columns, found in (
+        ("summary.csv", COLUMNS, rows),
+        ("confirm.csv", CONFIRM_COLUMNS, confirmed),
+    ):
+        if found:
+            with (folder / name).open("w", newline="") as file:
+                writer = csv.DictWriter(file, columns)
+                writer.writeheader()
+                writer.writerows(found)
+    host = {"processor": EVIL, "load_at_start": 1.5}
+    (folder / "run.json").write_text(json.dumps({"sessions": [{"host": host}]}))
+    return folder
 
 
-def test_a_picture_is_drawn(tmp_path, capsys):
-    (tmp_path / "summary.csv").write_text(
-        ",".join(COLUMNS) + "\n" + ",".join(ROW[column] for column in COLUMNS) + "\n"
-    )
-    for name, start in (("p.svg", b"<svg"), ("p.png", b"\x89PNG")):
-        assert main(["report", str(tmp_path), "-o", str(tmp_path / name)]) == 0
-        assert (tmp_path / name).read_bytes().startswith(start)
-    assert "a [b] &lt;c&gt;" in (tmp_path / "p.svg").read_text()
+CONFIRMED = dict.fromkeys(CONFIRM_COLUMNS, "") | {
+    "case_id": "0",
+    "device": "a [b] <c>",
+    "platform": "p",
+    "reference": "0.5",
+    "samples_per_ray": "10",
+    "time_s": "1e-5",
+    "rmse_predicted": "0.1",
+    "rmse_measured": "0.102",
+    "rmse_low": "0.1",
+    "rmse_high": "0.104",
+}
+
+
+@pytest.fixture
+def result(tmp_path):
+    rows = [
+        row_of(10 * i + j, tracker, tightness, 1e-6 * (1 + i + j))
+        for i, tracker in enumerate(("delta", "ratio", EVIL.replace("/", "")))
+        for j, tightness in enumerate((1.0, 2.0, 4.0))
+    ]
+    rows.append(row_of(99, "march", status="mismatch", reason="off"))
+    other = [row | {"device": "other"} for row in rows[:3]]
+    return result_of(tmp_path / "result", rows + other, [CONFIRMED])
+
+
+def test_relative_numbers_and_times(result):
+    report = load([result])
+    first = report.rows[0]
+    assert (first["v"], first["vt"], first["vl"]) == (1.0, 1e-6, 5.0)
+    assert (first["t10"], first["t01"]) == (1e-4, "never")
+    assert first["lo"] == 1e-6
+    assert report.confirmed[0]["ratio"] == pytest.approx(1.02)
+    assert [row["v"] for row in report.rows if row["status"] == "mismatch"] == [None]
 
 
 @pytest.mark.parametrize(
-    ("result", "output", "message"),
+    "chart",
+    ["cost", "pareto", "tightness-time", "tightness-lookups", "lookups", "occupancy", "devices"],
+)
+def test_every_chart_is_drawn(result, tmp_path, chart):
+    for name, start in (("p.svg", b"<svg"), ("p.png", b"\x89PNG")):
+        path = tmp_path / name
+        assert main(["report", str(result), "--chart", chart, "-o", str(path)]) == 0
+        assert path.read_bytes().startswith(start)
+    assert "<script" not in (tmp_path / "p.svg").read_text()
+
+
+def test_markdown_names_the_soonest(result):
+    text = markdown(load([result]))
+    line = next(line for line in text.splitlines() if line.startswith("| transmittance, cloud"))
+    assert "10 ms, delta, global x1" in line
+    assert "<script" not in text.replace("\\<", "")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
     [
-        ("nothing", "p.svg", "expected the folder of a run"),
-        (".", "p.pdf", "expected a name that ends in .svg or .png"),
+        (["-o", "p.pdf"], "expected a name that ends in one of .html, .md, .svg, .png"),
+        (["--format", "md", "-o", "p.svg"], "--format md does not fit p.svg"),
+        (["--chart", "pareta", "-o", "p.svg"], "did you mean 'pareto'?"),
+        (["-o", "none/p.html"], "cannot write none/p.html: No such file or directory"),
     ],
 )
-def test_what_cannot_be_drawn_is_told(tmp_path, capsys, result, output, message):
-    assert main(["report", str(tmp_path / result), "-o", str(tmp_path / output)]) == 2
+def test_mistakes(result, monkeypatch, tmp_path, capsys, arguments, message):
+    monkeypatch.chdir(tmp_path)
+    assert main(["report", str(result), *arguments]) == 2
     assert message in capsys.readouterr().err
 
 
-def test_a_result_without_a_measured_case_has_no_picture():
-    with pytest.raises(FreepathError, match="no case that was measured"):
-        report.chart([ROW | {"status": "skipped"}])
+def test_nothing_to_show(tmp_path, capsys):
+    assert main(["report", str(tmp_path / "none")]) == 2
+    assert "expected the folder of a run, with summary.csv in it" in capsys.readouterr().err
+    empty = result_of(tmp_path / "empty", [ROW | {"status": "build_failed", "variance": ""}])
+    assert main(["report", str(empty)]) == 2
+    assert "no case that was measured" in capsys.readouterr().err
+
+
+@pytest.fixture(scope="module")
+def browser():
+    api = pytest.importorskip("playwright.sync_api")
+    path = shutil.which("chromium") or shutil.which("chromium-browser")
+    if not path:
+        pytest.skip("no Chromium")
+    with api.sync_playwright() as playwright:
+        found = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
+        yield found
+        found.close()
+
+
+@pytest.fixture
+def opened(browser):
+    """Open a page; everything that it asks for, and every complaint, is kept."""
+    contexts = []
+
+    def opened(path, **options):
+        context = browser.new_context(**options)
+        contexts.append(context)
+        page, complaints, asked = context.new_page(), [], []
+        page.on("console", lambda message: complaints.append(message.text))
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        page.on("dialog", lambda dialog: complaints.append("dialog"))
+        page.on("request", lambda request: asked.append(request.url))
+        page.goto(path.as_uri())
+        page.wait_for_function("typeof vegaEmbed === 'function'")
+        page.wait_for_selector("#figure-cost canvas")
+        page.evaluate("freepathReady()")
+        return page, complaints, asked
+
+    yield opened
+    for context in contexts:
+        context.close()
+
+
+def column(page, place):
+    return page.locator(f"#body tr td:nth-child({place})").all_inner_texts()
+
+
+def test_the_page(result, opened):
+    _, path = write([result], None, None)
+    page, complaints, asked = opened(path)
+    assert len(column(page, 1)) == 13
+    page.locator("#head th", has_text="time").click()
+    times = column(page, 1 + page.locator("#head th").all_inner_texts().index("time"))
+    assert times[0] == "1 us"
+    page.locator("#head th", has_text="time").click()
+    assert column(page, 1 + page.locator("#head th").all_inner_texts().index("time"))[0] == "5 us"
+    page.fill("#filter", "ratio -x4")
+    page.wait_for_function("document.querySelectorAll('#body tr').length === 2")
+    assert all("ratio" in text for text in column(page, 1))
+    page.fill("#filter", "delta")
+    page.wait_for_function("document.querySelectorAll('#body tr').length === 6")
+    page.evaluate("freepathReady()")
+    page.evaluate("scrollTo(0, 0)")
+    page.wait_for_timeout(300)
+    page.evaluate("freepathReady()")
+    box = page.locator("#figure-cost canvas").bounding_box()
+    tip = page.locator("#vg-tooltip-element.visible")
+    for place in range(40):
+        down = 0.25 + 0.15 * (place % 4)
+        page.mouse.move(
+            box["x"] + (0.1 + place / 80) * box["width"], box["y"] + down * box["height"]
+        )
+        page.wait_for_timeout(60)
+        if tip.count():
+            break
+    assert "delta, global x" in tip.inner_text()
+    assert complaints == []
+    assert [url for url in asked if not url.startswith(("file:", "data:"))] == []
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_the_page_on_a_phone(result, opened, scheme):
+    _, path = write([result], None, None)
+    page, complaints, _ = opened(path, viewport={"width": 390, "height": 844}, color_scheme=scheme)
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390
+    colour = page.evaluate("getComputedStyle(document.body).backgroundColor")
+    assert (colour == "rgb(255, 255, 255)") == (scheme == "light")
+    assert complaints == []
+
+
+def test_ten_thousand_rows(tmp_path, opened):
+    rows = [
+        row_of(i, f"t{i % 40}", 1.0 + i % 7, 1e-6 * (1 + i % 97), medium=f"m-{i % 5}")
+        for i in range(10_000)
+    ]
+    result = result_of(tmp_path / "many", rows)
+    write([result], None, None)  # so that the library is there
+    started = time.process_time()
+    _, path = write([result], None, None)
+    assert time.process_time() - started < 5
+    page, complaints, _ = opened(path)
+    # by the browser's clock, until the table is there; other work on the machine is forgiven
+    ready = page.evaluate("performance.getEntriesByType('navigation')[0].domInteractive")
+    assert ready < 2000 * 4
+    started = page.evaluate("performance.now()")
+    page.fill("#filter", "t39 x3")
+    page.wait_for_function("document.querySelector('#place').textContent.includes('of 3')")
+    assert page.evaluate("performance.now()") - started < 4000
+    assert complaints == []
+
+
+def test_a_table_for_notebooks(result):
+    import freepath
+
+    table = freepath.load(result)
+    rows = table if isinstance(table, list) else table.to_dict("records")
+    assert len(rows) == 13
+    assert rows[0]["variance"] == 0.25
+    assert math.isinf(rows[0]["time_to_0.1pct_s"])
+    with pytest.raises(Exception, match="expected the folder of a run"):
+        freepath.load(result / "none")
+
+
+def test_a_run_from_python(work, selector):
+    import freepath
+    from freepath.errors import ConfigError
+
+    (work / "x.yaml").write_text(
+        "name: x\nrays: {orthographic: {resolution: [4, 4]}}\n"
+        "matrix: {medium: {homogeneous: {sigma_t: 1}}, tracker: delta}\nstop: {samples: 50}\n"
+    )
+    told = []
+    table = freepath.run(
+        "x.yaml", "out", devices=[selector], progress=lambda *what: told.append(what)
+    )
+    assert len(table) == 1
+    assert told
+    with pytest.raises(ConfigError, match=r"x.yaml:3"):
+        (work / "x.yaml").write_text("name: x\nrays: {orthographic: {}}\nmatrox: {}\n")
+        freepath.run("x.yaml", "out2")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from freepath import catalog, cli, config, plan, run, source
+from freepath import catalog, cli, config, plan, session, source
 from freepath.results import COLUMNS, SAMPLE_COLUMNS, ResultFolder, read_rows
 from freepath.sweep import Sweep
 
@@ -116,12 +116,12 @@ def test_rows_are_on_the_disk_as_each_case_ends(work, device):
             seen.append([line["case_id"] for line in csv.DictReader(file)])
         assert seen[-1][-1] == row["case_id"]
 
-    run.Run(
+    session.Run(
         loaded,
         known,
         plan.expand(loaded, known),
         ResultFolder(work / "out"),
-        run.Clock(0.0),
+        session.Clock(0.0),
         on_done,
         lambda done, total, what: None,
     ).execute([device])
@@ -141,15 +141,15 @@ def test_a_complete_run_is_not_run_again(go, work):
 class Interrupted(Sweep):
     """Is interrupted when its second row should be written."""
 
-    def _finish(self, job, row, rounds=()):
+    def _finish(self, job, row, rounds=(), *further):
         if len(rows()) == 1:
             self.folder._append("samples.csv", SAMPLE_COLUMNS, rounds)
             raise KeyboardInterrupt
-        super()._finish(job, row, rounds)
+        super()._finish(job, row, rounds, *further)
 
 
 def test_an_interrupted_run_is_completed(go, work, monkeypatch):
-    monkeypatch.setattr(run, "Sweep", Interrupted)
+    monkeypatch.setattr(session, "Sweep", Interrupted)
     code, printed = go()
     assert code == 130
     assert "interrupted with 1 of 4 cases done; go on with the same command" in printed.err
@@ -320,23 +320,23 @@ def test_estimates_are_the_same_for_the_same_seed(go, work):
 
 
 def test_folders_are_named_after_config_and_time(work):
-    first = run.new_folder("small")
+    first = session.new_folder("small")
     assert re.fullmatch(r"small-\d{8}-\d{6}", first.name)
     for name in ("small-20200101-000000", "small-20210101-000000", "small-2-20220101-000000"):
         (work / "results" / name).mkdir(parents=True)
     (work / "results" / "small-notes").mkdir()
-    assert run.newest_folder("small").name == "small-20210101-000000"
-    assert run.newest_folder("small-2").name == "small-2-20220101-000000"
-    with pytest.raises(run.FreepathError, match="no run of other in results/ to resume"):
-        run.newest_folder("other")
+    assert session.newest_folder("small").name == "small-20210101-000000"
+    assert session.newest_folder("small-2").name == "small-2-20220101-000000"
+    with pytest.raises(session.FreepathError, match="no run of other in results/ to resume"):
+        session.newest_folder("other")
 
 
 def test_two_runs_in_a_second_have_two_folders(work, monkeypatch):
-    monkeypatch.setattr(run, "STAMP", "20200101-000000")
+    monkeypatch.setattr(session, "STAMP", "20200101-000000")
     names = []
     for _ in range(3):
-        folder = run.new_folder("small")
+        folder = session.new_folder("small")
         folder.mkdir(parents=True)
         names.append(folder.name)
     assert names == ["small-20200101-000000", "small-20200101-000000-2", "small-20200101-000000-3"]
-    assert run.newest_folder("small").name == names[-1]
+    assert session.newest_folder("small").name == names[-1]

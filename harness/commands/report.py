@@ -1,4 +1,4 @@
-"""`freepath report`: a result as a picture."""
+"""`freepath report`: results as a page, a picture, Markdown, and small tables."""
 
 from __future__ import annotations
 
@@ -13,26 +13,44 @@ def add(commands: Any) -> None:
     """Declare its arguments."""
     report = commands.add_parser(
         "report",
-        help="draw what accuracy costs in time",
-        description="Draw the RMSE of every case of a result over device time, as .svg or .png.",
+        help="show what accuracy costs in time",
+        description="Write one HTML file that shows what accuracy costs in time, for one result or "
+        "several side by side, and print which case is soonest. Or write it as Markdown, or one of "
+        "its charts as a picture.",
         allow_abbrev=False,
     )
     report.add_argument(
-        "result", type=Path, metavar="RESULT", help="the folder of a run"
+        "result", type=Path, nargs="+", metavar="RESULT", help="the folder of a run; may be several"
     ).complete = shtab.DIRECTORY
     report.add_argument(
         "-o",
         "--output",
         type=Path,
-        default=Path("report.svg"),
         metavar="FILE",
-        help="where to draw it (default: report.svg)",
+        help="where to write it: .html, .md, .svg or .png (default: report.html in RESULT)",
     ).complete = shtab.FILE
+    report.add_argument(
+        "--format",
+        choices=("html", "md", "svg", "png"),
+        help="the format, where the name of FILE does not tell",
+    )
+    report.add_argument(
+        "--chart",
+        default="cost",
+        metavar="NAME",
+        help="which chart a picture is of: cost (default), pareto, tightness-time, "
+        "tightness-lookups, lookups, occupancy, devices, confirm",
+    )
 
 
 def execute(options: Namespace) -> int:
     """Run it; returns the exit code."""
     from freepath import report
+    from freepath.commands.common import console_of
+    from freepath.report.text import summary
 
-    print(f"wrote {report.write(options.result, options.output)}")
+    found, path = report.write(options.result, options.output, options.format, options.chart)
+    console = console_of()
+    console.print(summary(found))
+    console.print(f"wrote {path}", highlight=False, markup=False, soft_wrap=True)
     return 0

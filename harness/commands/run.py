@@ -20,8 +20,8 @@ from freepath.errors import FAILED, INTERRUPTED
 if TYPE_CHECKING:
     from freepath.plan import Case
     from freepath.results import ResultFolder
-    from freepath.run import Run
     from freepath.selection import Parts
+    from freepath.session import Run
     from rich.console import Console
 
 
@@ -54,6 +54,12 @@ def add(commands: Any) -> None:
         help="go on with the run in DIR (default: the newest of this config): rows whose config, "
         "source, device and driver are unchanged are kept",
     )
+    run.add_argument(
+        "--confirm",
+        action="store_true",
+        help="measure the error of each case at three more sample counts, write it beside the "
+        "prediction into confirm.csv, and tell how many predictions hold",
+    )
     run.add_argument("--json", action="store_true", help="print the rows as JSON, nothing else")
     # given to the process of a driver: who started it shows the rows of all
     run.add_argument("--rows-only", action="store_true", help=argparse.SUPPRESS)
@@ -65,22 +71,23 @@ def execute(options: Namespace) -> int:
     loaded, known, cases = cases_of(options)
     if options.show_only:
         return _show_only(options, cases)
-    from freepath import environment, run, selection
+    from freepath import environment, selection, session
     from freepath.device import open_devices
-    from freepath.results import ResultFolder
 
     load = environment.load()
     parts = selection.processes_of(options.device)
     devices = [] if parts else open_devices(options.device)
-    path = options.output or (run.newest_folder if options.resume else run.new_folder)(loaded.name)
-    folder = ResultFolder(path, resume=options.resume)
+    path = options.output or (session.newest_folder if options.resume else session.new_folder)(
+        loaded.name
+    )
+    folder = _folder(path, options)
     if parts:
         crashed = _run_in_processes(options, parts, folder)
         return max(_show(options, folder, cases, load), FAILED if crashed else 0)
     console = console_of(stderr=options.json)
     with _shown_progress(console) as (on_done, on_progress):
-        clock = run.Clock(started)
-        sweep = run.Run(loaded, known, cases, folder, clock, on_done, on_progress)
+        clock, told = session.Clock(started), (on_done, on_progress)
+        sweep = session.Run(loaded, known, cases, folder, clock, *told, options.confirm)
         try:
             sweep.execute(devices)
         except KeyboardInterrupt:
@@ -104,7 +111,7 @@ def _run_in_processes(options: Namespace, parts: Parts, folder: ResultFolder) ->
         arguments = ["run", options.config, "-o", str(folder.folder), "--rows-only"]
         if options.resume or (folder.folder / SUMMARY).exists():
             arguments.append("--resume")
-        arguments += ["--json"] * options.json
+        arguments += ["--json"] * options.json + ["--confirm"] * options.confirm
         for flag, values in (("-d", selectors), ("-a", options.axis), ("-R", [options.include])):
             arguments += [word for value in values if value is not None for word in (flag, value)]
         arguments += ["-E", options.exclude] * (options.exclude is not None)
@@ -128,6 +135,7 @@ def _show(
     sweep: Run | None = None,
 ) -> int:
     """Print what the folder holds, and what failed; returns the exit code."""
+    from freepath import table
     from freepath.results import records
 
     rows = _in_order(folder.rows(), cases)
@@ -138,9 +146,17 @@ def _show(
     _print_tables(console, rows, load)
     if sweep:
         _print_times(console, sweep)
+    if options.confirm:
+        console.print(table.confirmed(folder.confirmed()), highlight=False)
     for written in folder.paths():
         console.print(f"wrote {written}", highlight=False, markup=False, soft_wrap=True)
     return _say_failures(rows)
+
+
+def _folder(path: Path, options: Namespace) -> ResultFolder:
+    from freepath.results import ResultFolder
+
+    return ResultFolder(path, resume=options.resume, confirm=options.confirm)
 
 
 @contextmanager

@@ -105,6 +105,8 @@ class Run:
     """Told every row once it is written."""
     on_progress: Callable[[float, int, str], None]
     """Told how many cases are done, of how many, and what is being done."""
+    confirm: bool = False
+    """Whether the error that each case predicts is measured as well."""
     run_id: str = dataclasses.field(default_factory=lambda: uuid.uuid4().hex[:12])
     total: int = 0
     ended: int = 0
@@ -140,7 +142,8 @@ class Run:
             self.folder.close()
 
     def _sweep(self, device: Device) -> Sweep:
-        return Sweep(device, self.catalog, self.folder, self.run_id, self._done, self._progress)
+        told = self._done, self._progress
+        return Sweep(device, self.catalog, self.folder, self.run_id, *told, self.confirm)
 
     def _plan(self, sweep: Sweep, scenes: dict[str, Scene]) -> list[Job]:
         info = sweep.device.info

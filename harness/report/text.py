@@ -1,0 +1,117 @@
+"""A report as Markdown, and as small tables for a terminal."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from freepath.report.data import LADDER, Report
+from freepath.table import seconds, short
+from rich.markup import escape
+from rich.table import Table
+
+TARGETS = dict(zip(LADDER, ("to 10 %", "to 1 %", "to 0.1 %"), strict=True))
+HEADER = ("case", "device", "lookups", "time", "occ.", "rel. var.", "bias", *TARGETS.values())
+
+
+def winners(report: Report) -> list[list[str]]:
+    """For each question and device: what reaches each accuracy soonest, and when."""
+    found: dict[tuple[str, str], list[dict[str, Any]]] = {}
+    for row in report.measured:
+        found.setdefault((row["q"], row["device"]), []).append(row)
+    lines = []
+    for (question, device), rows in found.items():
+        cells = [question, device]
+        for name in TARGETS:
+            reaching = [row for row in rows if isinstance(row[name], float)]
+            best = min(reaching, key=lambda row, name=name: row[name], default=None)
+            cells.append(f"{seconds(best[name])}, {best['method']}" if best else "none")
+        lines.append(cells)
+    return lines
+
+
+def summary(report: Report) -> Table:
+    """The winners as a table for the terminal."""
+    several = len(report.values("device")) > 1
+    table = Table(title="soonest at an accuracy", title_justify="left", box=None)
+    table.padding = (0, 1, 0, 0)
+    table.add_column("question", overflow="fold")
+    if several:
+        table.add_column("device", overflow="fold")
+    for name in TARGETS.values():
+        table.add_column(name, overflow="fold")
+    for question, device, *times in winners(report):
+        table.add_row(*map(escape, [question, *([device] if several else []), *times]))
+    return table
+
+
+def _time(value: float | str | None) -> str:
+    return seconds(math.inf if value == "never" else value)
+
+
+def cells(row: dict[str, Any]) -> list[str]:
+    """A case's row of the full table."""
+    if row["v"] is None:
+        return [row["method"], row["device"], *[""] * 4, row["status"], *[""] * len(TARGETS)]
+    bias = f"{100 * row['bias']:+.2g}±{100 * row['bias_width']:.1g}%"
+    return [
+        row["method"],
+        row["device"],
+        short(row["lookups"]),
+        seconds(row["t"]),
+        f"{100 * row['occupancy']:.0f}%",
+        short(row["v"]),
+        bias,
+        *(_time(row[name]) for name in TARGETS),
+    ]
+
+
+def _markdown_row(texts: list[str] | tuple[str, ...]) -> str:
+    special = str.maketrans({c: f"\\{c}" for c in "\\`*_[]<>|#"} | {"\n": " ", "\r": " "})
+    return "| " + " | ".join(text.translate(special) for text in texts) + " |"
+
+
+def _markdown_table(header: list[str] | tuple[str, ...], rows: list[list[str]]) -> list[str]:
+    return [_markdown_row(header), "|" + " --- |" * len(header), *map(_markdown_row, rows)]
+
+
+def markdown(report: Report) -> str:
+    """The whole report: winners, all cases, and where it was measured."""
+    lines = ["# What accuracy costs in time", ""]
+    lines += _markdown_table(["question", "device", *TARGETS.values()], winners(report))
+    for question in report.values("q"):
+        rows = [cells(row) for row in report.rows if row["q"] == question]
+        lines += ["", f"## {question}".translate({ord("\n"): " "}), ""]
+        lines += _markdown_table(HEADER, rows)
+    lines += ["", "## Environment", ""]
+    facts = [[key, value] for run in report.runs for key, value in environment(run)]
+    lines += _markdown_table(["", ""], facts)
+    return "\n".join(lines) + "\n"
+
+
+def environment(run: dict[str, Any]) -> list[tuple[str, str]]:
+    """What run.json tells of where a result was measured, as names and texts."""
+    facts = [("result", run["name"])]
+    config = run.get("config")
+    if isinstance(config, dict):
+        facts.append(("config", str(config.get("name", ""))))
+    for session in _dicts(run.get("sessions")):
+        facts += [(name, str(session[name])) for name in ("started", "ended") if name in session]
+        facts += _flat(session.get("host"))
+    for device in _dicts(run.get("devices")):
+        facts += _flat(device, "device ")
+    return facts
+
+
+def _dicts(value: Any) -> list[dict[str, Any]]:
+    return [one for one in value if isinstance(one, dict)] if isinstance(value, list) else []
+
+
+def _flat(value: Any, prefix: str = "") -> list[tuple[str, str]]:
+    """The items of a dictionary, with those of dictionaries in it in its place."""
+    if not isinstance(value, dict):
+        return []
+    found = []
+    for key, one in value.items():
+        found += _flat(one, prefix) if isinstance(one, dict) else [(f"{prefix}{key}", str(one))]
+    return found

@@ -1,0 +1,53 @@
+"""Writes a report in the format that a file's name, or --format, asks for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from freepath.errors import FreepathError
+from freepath.report.data import Report, load
+
+FORMATS = ("html", "md", "svg", "png")
+
+
+def format_of(output: Path | None, wanted: str | None) -> str:
+    """The format: as asked for, else as the file is named, else a page."""
+    suffix = output.suffix.lower()[1:] if output else ""
+    if wanted is None and output and suffix not in FORMATS:
+        expected = ", ".join(f".{name}" for name in FORMATS)
+        raise FreepathError(f"{output}: expected a name that ends in one of {expected}")
+    if wanted and suffix in FORMATS and suffix != wanted:
+        raise FreepathError(f"--format {wanted} does not fit {output}")
+    return wanted or suffix or "html"
+
+
+def write(
+    results: Sequence[Path], output: Path | None, wanted: str | None, chart: str = "cost"
+) -> tuple[Report, Path]:
+    """Write the report of results, into `output` or a file of the first one's folder.
+
+    Raises FreepathError where a result cannot be read, a file not be written, or a chart has
+    nothing to show.
+    """
+    chosen = format_of(output, wanted)
+    report = load(results)
+    if not report.measured:
+        raise FreepathError("the result has no case that was measured, so there is no report of it")
+    output = output or results[0] / f"report.{chosen}"
+    try:
+        if chosen == "html":
+            from freepath.report.page import page
+
+            output.write_text(page(report), encoding="utf-8")
+        elif chosen == "md":
+            from freepath.report.text import markdown
+
+            output.write_text(markdown(report), encoding="utf-8")
+        else:
+            from freepath.report.pictures import save
+
+            save(report, chart, output)
+    except OSError as error:
+        raise FreepathError(f"cannot write {output}: {error.strerror}") from error
+    return report, output
