@@ -36,7 +36,6 @@ class Effects:
     channels: int
     chromatic: bool
     phase: str
-    length_only: bool
     near_light: bool = False
     """Whether the tracker chooses distances with the light in mind."""
     shadow: Shadow | None = None
@@ -148,58 +147,67 @@ def of_scene(
     """
     everything = case.effects == "all"
     count = len(medium.channels)
-    model = case.medium
     channels = ALL_CHANNELS if everything and count == 1 else count
+    names = _names(case, shadow, everything=everything)
+    phase = "isotropic"
+    if case.medium.g or everything:
+        phase = "henyey_greenstein"
+    if case.medium.phase == "rod":
+        phase = "rod"
+    return Effects(
+        names=names,
+        channels=channels,
+        chromatic=chromatic or channels > 1,
+        phase=phase,
+        near_light=near_light,
+        shadow=shadow if "point_light" in names else None,
+        values=_values(case, medium, names, channels),
+    )
+
+
+def _names(case: Any, shadow: Shadow | None, *, everything: bool) -> tuple[str, ...]:
+    """The effects that a scene has, or all that it could have."""
+    model, light = case.medium, case.light
+    collects = case.estimand != "path_length"
+    scatters = everything or (any(model.albedo) and case.scatterings != 0)
+    lit = everything or hasattr(light, "intensity")
+    has = {
+        "length": not collects,
+        "emission": collects and (everything or any(model.emission)),
+        "environment": collects and (everything or hasattr(light, "radiance")),
+        "point_light": collects and scatters and lit and shadow is not None,
+        "scattering": scatters,
+        "roulette": scatters and case.scatterings == UNLIMITED,
+    }
+    return tuple(name for name, there in has.items() if there)
+
+
+def _values(
+    case: Any, medium: Any, names: tuple[str, ...], channels: int
+) -> dict[str, dict[str, Any]]:
+    """The numbers of a scene's effects, by their groups."""
+    model, light = case.medium, case.light
 
     def spread(given: tuple[float, ...]) -> list[float]:
         return list(given) * channels if len(given) == 1 else list(given)
 
-    limit = MOST_SCATTERINGS if case.scatterings == UNLIMITED else case.scatterings
-    light = case.light
-    radiance = getattr(light, "radiance", None)
-    intensity = getattr(light, "intensity", None)
-    scatters = bool(any(model.albedo) and limit) or everything
-    length_only = case.estimand == "path_length"
-    names = ["length"] if length_only else []
     optics: dict[str, Any] = {"albedo": spread(model.albedo)}
-    if not length_only and (any(model.emission) or everything):
-        names.append("emission")
+    if "emission" in names:
         optics["emission"] = spread(model.emission)
-    if not length_only and (radiance is not None or everything):
-        names.append("environment")
-        optics["environment"] = spread(radiance or (0.0,))
-    values: dict[str, Any] = {"optics": optics}
-    phase = (
-        "rod"
-        if model.phase == "rod"
-        else "henyey_greenstein"
-        if model.g or everything
-        else "isotropic"
-    )
-    if scatters:
-        optics["scatterings"] = limit
+    if "environment" in names:
+        optics["environment"] = spread(getattr(light, "radiance", (0.0,)))
+    values: dict[str, dict[str, Any]] = {"optics": optics}
+    if "scattering" in names:
+        unlimited = case.scatterings == UNLIMITED
+        optics["scatterings"] = MOST_SCATTERINGS if unlimited else case.scatterings
         optics["g"] = model.g
         values["space"] = _space(medium)
-        if not length_only and (intensity is not None or everything) and shadow:
-            names.append("point_light")
-            position = getattr(light, "position", (0.0, 0.0, 0.0))
-            place = medium.to_medium[:, :3] @ np.array(position) + medium.to_medium[:, 3]
-            values["light"] = dict(zip("xyz", place.tolist(), strict=True))
-            values["light"]["intensity"] = spread(intensity or (0.0,))
-        names.append("scattering")
-        if case.scatterings == UNLIMITED:
-            names.append("roulette")
-    lit = "point_light" in names
-    return Effects(
-        names=tuple(names),
-        channels=channels,
-        chromatic=chromatic or channels > 1,
-        phase=phase,
-        length_only=length_only,
-        near_light=near_light,
-        shadow=shadow if lit else None,
-        values=values,
-    )
+    if "point_light" in names:
+        position = np.array(getattr(light, "position", (0.0, 0.0, 0.0)))
+        place = medium.to_medium[:, :3] @ position + medium.to_medium[:, 3]
+        values["light"] = dict(zip("xyz", place.tolist(), strict=True))
+        values["light"]["intensity"] = spread(getattr(light, "intensity", (0.0,)))
+    return values
 
 
 def _space(medium: Any) -> dict[str, list[float]]:
