@@ -1,7 +1,9 @@
 import re
+from pathlib import Path
 
 import pytest
 from freepath import kernel_files, source
+from freepath.effects import Effects
 from freepath.errors import CatalogError
 from freepath.kernel_files import split_front_matter
 from freepath.source import Source, Structure, combined_hash, compose, numbers_of
@@ -211,3 +213,49 @@ def test_front_matter_and_code_keep_their_lines():
 def test_a_file_without_front_matter_is_all_code():
     assert split_front_matter("int x; /*--- no ---*/\n") == (None, "int x; /*--- no ---*/\n")
     assert split_front_matter("") == (None, "")
+
+
+def radiance(**changes):
+    """A source of radiance with these effects."""
+    effects = Effects(
+        names=changes.pop("names"),
+        channels=1,
+        chromatic=False,
+        phase="isotropic",
+        values={"optics": {"albedo": [0.5], "scatterings": 1}},
+        **changes,
+    )
+    return composed(estimand="radiance", paths=effects)
+
+
+def test_single_flights_have_nothing_of_paths():
+    assert not [name for name in files_of(composed()) if name.startswith(("effects/", "phase/"))]
+
+
+def test_a_source_has_the_effects_that_it_needs_and_no_other():
+    bare = files_of(radiance(names=()))
+    assert [name for name in bare if name.startswith("effects/")] == [
+        "effects/grey.cl",
+        "effects/flight_names.cl",
+        "effects/own_names.cl",
+        "effects/paths.cl",
+    ]
+    for name in ("emission", "environment"):
+        added = set(files_of(radiance(names=(name,)))) - set(bare)
+        assert added == {f"effects/{name}.cl"}
+    scattering = set(files_of(radiance(names=("scattering",)))) - set(bare)
+    assert scattering == {
+        "effects/direction.cl",
+        "effects/no_roulette.cl",
+        "effects/scattering.cl",
+        "math/circle_polynomial.cl",
+        "phase/isotropic.cl",
+    }
+
+
+def test_paths_know_the_step_cap():
+    """They restore their ray where the main loop cuts them off."""
+    text = radiance(names=("scattering",))
+    cap = re.search(r"#define MOST_STEPS \(1 << (\d+)\)", text)
+    runner = (Path(source.__file__).parent / "runner.py").read_text("utf-8")
+    assert f"STEP_CAP = 1 << {cap[1]}\n" in runner
