@@ -140,7 +140,9 @@ class Run:
             self.folder.close()
 
     def _sweep(self, device: Device) -> Sweep:
-        return Sweep(device, self.catalog, self.folder, self.run_id, self._done, self._progress)
+        told = self._done, self._progress
+        render = self.config.render
+        return Sweep(device, self.catalog, self.folder, self.run_id, *told, render=render)
 
     def _plan(self, sweep: Sweep, scenes: dict[str, Scene]) -> list[Job]:
         info = sweep.device.info

@@ -12,6 +12,7 @@ from freepath.catalog import Catalog
 from freepath.device import Device, Program
 from freepath.errors import BuildError, DriverLimitError, FreepathError, RunError
 from freepath.measure import Bench, interleave
+from freepath.pictures import write_pictures
 from freepath.plan import Case
 from freepath.results import ResultFolder
 from freepath.rows import base_row, effects_of, measured_row, round_rows
@@ -47,6 +48,8 @@ class Sweep:
     """Told every row once it is written."""
     on_progress: Callable[[float, str], None]
     """Told how many cases' worth is under way, and what is being done."""
+    render: bool = False
+    """Whether cases whose rays have a picture get one."""
     time_build_s: float = 0.0
     _programs: dict[str, Program | BuildError] = field(default_factory=dict)
 
@@ -164,6 +167,9 @@ class Sweep:
         values = scene.reference(job.case)
         largest = scene.largest_score(job.case.estimand)
         row = measured_row(job.row, tracker, found, values, largest)
+        if self.render:
+            wrong = write_pictures(self.folder.folder, row, job.case.rays, found.moments)
+            row["reason"] = "; ".join(filter(None, (row["reason"], wrong)))
         self._finish(job, row, round_rows(row, found))
 
     def _fail(self, job: Job, error: FreepathError) -> None:

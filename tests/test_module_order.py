@@ -25,7 +25,7 @@ ORDER = (
     ("runner",),
     ("measure",),
     ("results",),
-    ("rows", "table", "binding"),
+    ("rows", "table", "binding", "pictures"),
     ("sweep", "report"),
     ("run", "arguments", "device_setup"),
     ("commands",),
