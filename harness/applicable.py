@@ -39,7 +39,8 @@ def _path_reason(tracker: Tracker, point: Point, catalog: Catalog) -> str:
     light = point["light"]
     if light is None:
         return ""
-    has_point, has_environment = hasattr(light, "intensity"), hasattr(light, "radiance")
+    has_point = hasattr(light, "intensity")
+    has_environment = hasattr(light, "radiance") or hasattr(light, "file")
     single = tracker.single_flight if isinstance(tracker.single_flight, dict) else {}
     given = point["tracker"].parameters()
     alone = [name for name, choices in single.items() if given[name] in choices]

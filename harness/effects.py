@@ -14,6 +14,8 @@ from freepath.kernel_files import KernelFile
 MOST_SCATTERINGS = (1 << 24) - 1
 """What `unlimited` is in a kernel, which counts in float; far above any path's steps."""
 ALL_CHANNELS = 3
+SKY_ROWS, SKY_COLUMNS = 64, 128
+"""Of the table that an image of the environment is resampled to, without the rows beyond poles."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +80,10 @@ class Effects:
         before = ["effects/chromatic" if self.chromatic else "effects/grey"]
         if "scattering" in self:
             circle = "math/circle_builtin" if exact else "math/circle_polynomial"
-            before += [circle, f"phase/{self.phase}", "effects/direction"]
+            before += [circle, f"phase/{self.phase}"]
+        if "space" in self.values:
+            before.append("effects/direction")
+        if "scattering" in self:
             before += ["effects/near_light"] if self.near_light else []
             limited = "roulette" if "roulette" in self else "no_roulette"
             before.append(f"effects/{limited}")
@@ -97,7 +102,8 @@ class Effects:
 
     @property
     def _after(self) -> list[str]:
-        order = ("length", "emission", "environment", "point_light", "scattering")
+        order = ("length", "emission", "environment", "environment_image")
+        order += ("point_light", "scattering")
         return [f"effects/{name}" for name in order if name in self]
 
     def _hooks(self) -> str:
@@ -105,6 +111,8 @@ class Effects:
         at_end = ["collect_length(path, ended);"] if "length" in self else []
         if "environment" in self:
             at_end.append("see_environment(path, scene, ended & path->escaped);")
+        if "environment_image" in self:
+            at_end.append("see_image(path, scene, ended & path->escaped);")
         at_end += [
             "const mask here = ended & ~path->escaped;",
             "if (!any_lane(here))",
@@ -168,6 +176,8 @@ def of_scene(
     if not length_only and (radiance is not None or everything):
         names.append("environment")
         optics["environment"] = spread(radiance or (0.0,))
+    if not length_only and hasattr(light, "file"):
+        names.append("environment_image")
     values: dict[str, Any] = {"optics": optics}
     phase = (
         "rod"
@@ -179,7 +189,9 @@ def of_scene(
     if scatters:
         optics["scatterings"] = limit
         optics["g"] = model.g
+    if scatters or "environment_image" in names:
         values["space"] = _space(medium)
+    if scatters:
         if not length_only and (intensity is not None or everything) and shadow:
             names.append("point_light")
             position = getattr(light, "position", (0.0, 0.0, 0.0))

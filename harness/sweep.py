@@ -58,7 +58,7 @@ class Sweep:
         row = base_row(case, self.device.info, self.run_id)
         row["effects"] = effects_of(case, scene.medium.kernel)
         row["rays"] = len(scene.segments)
-        row["config_sha256"] = source.combined_hash(case.config_sha256, scene.fingerprint)
+        row["config_sha256"] = source.combined_hash(case.config_sha256, scene.fingerprint_of(case))
         if case.arithmetic == "double" and not self.device.info.fp64:
             row["reason"] = row["reason"] or "the device has no double precision"
         row["reason"] = row["reason"] or self._control_reason(case, scene)
