@@ -39,7 +39,8 @@ def _path_reason(tracker: Tracker, point: Point, catalog: Catalog) -> str:
     light = point["light"]
     if light is None:
         return ""
-    has_point, has_environment = hasattr(light, "intensity"), hasattr(light, "radiance")
+    has_point = hasattr(light, "intensity")
+    has_environment = hasattr(light, "radiance") or hasattr(light, "file")
     single = tracker.single_flight if isinstance(tracker.single_flight, dict) else {}
     given = point["tracker"].parameters()
     alone = [name for name, choices in single.items() if given[name] in choices]
@@ -47,6 +48,8 @@ def _path_reason(tracker: Tracker, point: Point, catalog: Catalog) -> str:
     reasons = {
         f"{tracker.name} with this {''.join(alone)} is for single flights": bool(alone),
         f"{tracker.name} needs a point light": "light" in tracker.needs and not has_point,
+        f"{tracker.name} needs a medium that scatters": "light" in tracker.needs
+        and not (any(point["medium"].albedo) and point["scatterings"]),
         f"{tracker.name} never leaves the medium, and around it is light": not tracker.escapes
         and has_environment,
         "the rod model has no chance to scatter towards a point": shadow

@@ -16,7 +16,7 @@ from freepath.device import Device, DeviceInfo, Program, scalar_type
 from freepath.majorants import Majorant
 from freepath.plan import Case
 from freepath.runner import KernelData, Runner
-from freepath.scene import Medium, make_rays, path_reference, reference, segments
+from freepath.scene import Medium, Sky, make_rays, path_reference, read_sky, reference, segments
 from freepath.source import Structure
 
 
@@ -27,13 +27,15 @@ class Scene:
     medium: Medium
     segments: np.ndarray
     """(rays, 7), as scene.segments gives them."""
+    search_path: tuple[str | Path, ...] = ()
+    """Where images of lights are looked for first."""
     _kept: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
 
     @classmethod
     def of(cls, case: Case, medium: Medium, search_path: Iterable[str | Path]) -> Scene:
         """Make the rays of a case in its medium."""
         origins, directions = make_rays(case.rays, medium, case.seed, search_path)
-        return cls(medium, segments(origins, directions, medium))
+        return cls(medium, segments(origins, directions, medium), tuple(search_path))
 
     def _keep(self, key: Any, make: Callable[[], Any]) -> Any:
         if key not in self._kept:
@@ -43,7 +45,24 @@ class Scene:
     def for_device(self, info: DeviceInfo) -> Scene:
         """The same, with but a few rays, evenly chosen, where a device interprets kernels."""
         few = limits.rays_of(self.segments, info)
-        return self if few is self.segments else self._keep("few", lambda: Scene(self.medium, few))
+        if few is self.segments:
+            return self
+        return self._keep("few", lambda: Scene(self.medium, few, self.search_path))
+
+    def sky(self, case: Case) -> Sky | None:
+        """The image that lights a case, in the medium's channels; None where it has none.
+
+        Raises VolumeError for a file that cannot be used.
+        """
+        if not hasattr(case.light, "file"):
+            return None
+        count = len(self.medium.channels)
+        return self._keep(case.light, lambda: read_sky(case.light, count, self.search_path))
+
+    def fingerprint_of(self, case: Case) -> str:
+        """Identifies the medium, the rays and the image that lights a case."""
+        sky = self.sky(case)
+        return source.combined_hash(self.fingerprint, sky.fingerprint) if sky else self.fingerprint
 
     @property
     def fingerprint(self) -> str:
@@ -59,7 +78,9 @@ class Scene:
             key = case.estimand
             return self._keep(key, lambda: reference(key, self.medium, self.segments))
         key = (case.estimand, case.light, case.scatterings)
-        return self._keep(key, lambda: path_reference(case, self.medium, self.segments))
+        return self._keep(
+            key, lambda: path_reference(case, self.medium, self.segments, self.sky(case))
+        )
 
     def bounds(self, cells: tuple[int, int, int]) -> tuple[np.ndarray, np.ndarray]:
         """The tightest minorant and majorant of each cell, [nz, ny, nx]."""
@@ -173,7 +194,17 @@ def runner_of(
     )
     # cases that share a majorant and a control share their buffer
     control = tuple(sorted(case.params.items())) if controlled else None
-    buffer = data.keep((case.majorant, case.tightness, control), majorant.data)
+    key, in_buffer = (case.majorant, case.tightness, control), majorant.data
+    if structure.paths and "environment_image" in structure.paths:
+        key = (*key, case.light, structure.channels)
+        in_buffer = _behind(scene.sky(case), structure.channels, majorant.data)
+    buffer = data.keep(key, in_buffer)
     uploaded = program.device.upload(np.array(numbers, scalar_type(case.arithmetic)))
     fixed = case.arithmetic, structure.lanes, case.seed, structure.channels
     return Runner(program, data, uploaded, buffer, *fixed)
+
+
+def _behind(sky: Sky, channels: int, majorant: np.ndarray | None) -> np.ndarray:
+    """A majorant's array behind the table of a sky, of which each channel has its own."""
+    table = np.broadcast_to(sky.table, (channels, *sky.table.shape[1:])).reshape(-1)
+    return table if majorant is None else np.concatenate([table, majorant.reshape(-1)])

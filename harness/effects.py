@@ -14,6 +14,8 @@ from freepath.kernel_files import KernelFile
 MOST_SCATTERINGS = (1 << 24) - 1
 """What `unlimited` is in a kernel, which counts in float; far above any path's steps."""
 ALL_CHANNELS = 3
+SKY_ROWS, SKY_COLUMNS = 64, 128
+"""Of the table that an image of the environment is resampled to, without the rows beyond poles."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +79,10 @@ class Effects:
         before = ["effects/chromatic" if self.chromatic else "effects/grey"]
         if "scattering" in self:
             circle = "math/circle_builtin" if exact else "math/circle_polynomial"
-            before += [circle, f"phase/{self.phase}", "effects/direction"]
+            before += [circle, f"phase/{self.phase}"]
+        if "space" in self.values:
+            before.append("effects/direction")
+        if "scattering" in self:
             before += ["effects/near_light"] if self.near_light else []
             limited = "roulette" if "roulette" in self else "no_roulette"
             before.append(f"effects/{limited}")
@@ -96,7 +101,8 @@ class Effects:
 
     @property
     def _after(self) -> list[str]:
-        order = ("length", "emission", "environment", "point_light", "scattering")
+        order = ("length", "emission", "environment", "environment_image")
+        order += ("point_light", "scattering")
         return [f"effects/{name}" for name in order if name in self]
 
     def _hooks(self) -> str:
@@ -104,6 +110,8 @@ class Effects:
         at_end = ["collect_length(path, ended);"] if "length" in self else []
         if "environment" in self:
             at_end.append("see_environment(path, scene, ended & path->escaped);")
+        if "environment_image" in self:
+            at_end.append("see_image(path, scene, ended & path->escaped);")
         at_end += [
             "const mask here = ended & ~path->escaped;",
             "if (!any_lane(here))",
@@ -175,6 +183,7 @@ def _names(case: Any, shadow: Shadow | None, *, everything: bool) -> tuple[str, 
         "length": not collects,
         "emission": collects and (everything or any(model.emission)),
         "environment": collects and (everything or hasattr(light, "radiance")),
+        "environment_image": collects and hasattr(light, "file"),
         "point_light": collects and scatters and lit and shadow is not None,
         "scattering": scatters,
         "roulette": scatters and case.scatterings == UNLIMITED,
@@ -201,6 +210,7 @@ def _values(
         unlimited = case.scatterings == UNLIMITED
         optics["scatterings"] = MOST_SCATTERINGS if unlimited else case.scatterings
         optics["g"] = model.g
+    if "scattering" in names or "environment_image" in names:
         values["space"] = _space(medium)
     if "point_light" in names:
         position = np.array(getattr(light, "position", (0.0, 0.0, 0.0)))

@@ -23,6 +23,7 @@ EFFECTS = {
     "heterogeneous": "the extinction varies: a lookup at each tentative collision",
     "emission": "the medium emits: collected where a path is absorbed",
     "environment": "light from outside: collected where a path leaves",
+    "environment_image": "light from outside as an image has it: looked up where a path leaves",
     "scattering": "a path goes on in a new direction; phase: isotropic, Henyey-Greenstein or rod",
     "roulette": "scatterings without limit: a path of little weight may end",
     "point_light": "a shadow ray at each scattering, with a tracker of its own",

@@ -68,6 +68,7 @@ def build_scenes(cases: list[Case], folders: list[Path]) -> dict[str, Scene]:
         key = scene_key(case)
         if key not in scenes:
             scenes[key] = Scene.of(case, build_medium(case.medium, folders), folders)
+        scenes[key].sky(case)  # so that an image that cannot be used is told before anything runs
     return scenes
 
 
@@ -143,7 +144,9 @@ class Run:
 
     def _sweep(self, device: Device) -> Sweep:
         told = self._done, self._progress
-        return Sweep(device, self.catalog, self.folder, self.run_id, *told, self.confirm)
+        sweep = Sweep(device, self.catalog, self.folder, self.run_id, *told)
+        sweep.confirm, sweep.render = self.confirm, self.config.render
+        return sweep
 
     def _plan(self, sweep: Sweep, scenes: dict[str, Scene]) -> list[Job]:
         info = sweep.device.info

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from freepath import kernel_files
-from freepath.effects import Effects
+from freepath.effects import SKY_COLUMNS, SKY_ROWS, Effects
 from freepath.errors import CatalogError
 from freepath.kernel_files import KernelFile
 
@@ -147,6 +147,8 @@ def _defines(structure: Structure) -> str:
         f"#define INTEGER {'long' if double else 'int'}",
         f"#define ROUNDING {'2.220446049250313e-16' if double else '1.1920929e-7f'}",
     ]
+    if _has_sky(structure):
+        lines += [f"#define SKY_ROWS {SKY_ROWS}", f"#define SKY_COLUMNS {SKY_COLUMNS}"]
     if double:
         lines.insert(0, "#pragma OPENCL EXTENSION cl_khr_fp64 : enable")
     shadow = structure.paths.shadow if structure.paths else None
@@ -178,6 +180,12 @@ def _structs(structure: Structure, walks: list[KernelFile]) -> str:
     members = " ".join(f"{_type_of(group)} {group};" for group in groups)
     lines.append(f"typedef struct {{ {members} }} Numbers;")
     pointers = "__global const float *medium_data; __global const float *majorant_data;"
+    data = "medium_data, majorant_data"
+    if _has_sky(structure):
+        # in one buffer, so that scenes without an image have no argument for it
+        pointers += " __global const float *sky_data;"
+        first = "CHANNELS * (SKY_ROWS + 2) * SKY_COLUMNS"
+        data = f"medium_data, majorant_data + {first}, majorant_data"
     lines.append(f"typedef struct {{ {members} {pointers} }} Scene;")
     values = "".join(f"numbers->{group}, " for group in groups)
     lines += [
@@ -185,11 +193,15 @@ def _structs(structure: Structure, walks: list[KernelFile]) -> str:
         "                        __global const float *medium_data,",
         "                        __global const float *majorant_data)",
         "{",
-        f"    const Scene scene = {{{values}medium_data, majorant_data}};",
+        f"    const Scene scene = {{{values}{data}}};",
         "    return scene;",
         "}",
     ]
     return "\n".join(lines + _state(structure, walks))
+
+
+def _has_sky(structure: Structure) -> bool:
+    return structure.paths is not None and "environment_image" in structure.paths
 
 
 def _type_of(group: str) -> str:

@@ -13,6 +13,7 @@ from freepath.confirm import confirmed_rows
 from freepath.device import Device, Program
 from freepath.errors import BuildError, DriverLimitError, FreepathError, RunError
 from freepath.measure import Bench, interleave
+from freepath.pictures import write_pictures
 from freepath.plan import Case
 from freepath.results import ResultFolder
 from freepath.rows import base_row, effects_of, measured_row, round_rows
@@ -50,6 +51,8 @@ class Sweep:
     """Told how many cases' worth is under way, and what is being done."""
     confirm: bool = False
     """Whether the error that a case predicts is measured as well."""
+    render: bool = False
+    """Whether cases whose rays have a picture get one."""
     time_build_s: float = 0.0
     _programs: dict[str, Program | BuildError] = field(default_factory=dict)
 
@@ -58,7 +61,7 @@ class Sweep:
         row = base_row(case, self.device.info, self.run_id)
         row["effects"] = effects_of(case, scene.medium.kernel)
         row["rays"] = len(scene.segments)
-        row["config_sha256"] = source.combined_hash(case.config_sha256, scene.fingerprint)
+        row["config_sha256"] = source.combined_hash(case.config_sha256, scene.fingerprint_of(case))
         if case.arithmetic == "double" and not self.device.info.fp64:
             row["reason"] = row["reason"] or "the device has no double precision"
         row["reason"] = row["reason"] or self._control_reason(case, scene)
@@ -167,6 +170,9 @@ class Sweep:
         values = scene.reference(job.case)
         largest = scene.largest_score(job.case.estimand)
         row = measured_row(job.row, tracker, found, values, largest)
+        if self.render:
+            wrong = write_pictures(self.folder.folder, row, job.case.rays, found.moments)
+            row["reason"] = "; ".join(filter(None, (row["reason"], wrong)))
         confirmed = []
         if self.confirm and row["status"] == "ok" and values is not None:
             try:

@@ -25,7 +25,7 @@ ORDER = (
     ("runner",),
     ("measure",),
     ("results",),
-    ("rows", "table", "binding", "confirm"),
+    ("rows", "table", "binding", "confirm", "pictures"),
     ("sweep", "report", "compare"),
     ("session", "arguments", "device_setup"),
     ("api", "check"),

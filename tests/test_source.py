@@ -217,12 +217,14 @@ def test_a_file_without_front_matter_is_all_code():
 
 def radiance(**changes):
     """A source of radiance with these effects."""
+    names = changes.pop("names")
+    space = {"space": {"to_world": [1.0] * 9}} if "scattering" in names else {}
     effects = Effects(
-        names=changes.pop("names"),
+        names=names,
         channels=1,
         chromatic=False,
         phase="isotropic",
-        values={"optics": {"albedo": [0.5], "scatterings": 1}},
+        values={"optics": {"albedo": [0.5], "scatterings": 1}} | space,
         **changes,
     )
     return composed(estimand="radiance", paths=effects)

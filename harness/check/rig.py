@@ -17,7 +17,7 @@ from freepath.check.verdict import NotApplicable
 from freepath.device import Device, Program, scalar_type
 from freepath.plan import Case
 from freepath.runner import KernelData, Round, Runner
-from freepath.scene import Medium, build_medium, path_reference, reference
+from freepath.scene import Medium, Sky, build_medium, path_reference, reference
 from freepath.scene import segments as inside
 from freepath.source import Source
 
@@ -71,6 +71,7 @@ class Flight:
     runner: Runner
     recording: bool
     """Whether the kernel writes every sample: then every run must give it the room."""
+    sky: Sky | None = None
 
     @property
     def rounding(self) -> float:
@@ -80,7 +81,7 @@ class Flight:
     def reference(self) -> np.ndarray:
         """The exact value of each ray."""
         if self.case.light is not None:
-            return path_reference(self.case, self.medium, self.segments)
+            return path_reference(self.case, self.medium, self.segments, self.sky)
         return reference(self.case.estimand, self.medium, self.segments)
 
     def run(self, samples: int, blocks: int = 1, **options: Any) -> Round:
@@ -176,7 +177,8 @@ class Rig:
         data = KernelData.upload(self.device, scene.segments, medium.data, case.arithmetic)
         runner = binding.runner_of(case, structure, scene, self.program(text), data)
         read = scene.segments.astype(scalar_type(case.arithmetic)).astype(np.float64)
-        return Flight(case, self.catalog.trackers[case.tracker], medium, read, runner, record)
+        tracker = self.catalog.trackers[case.tracker]
+        return Flight(case, tracker, medium, read, runner, record, scene.sky(case))
 
     def program(self, text: Source) -> Program:
         """Build a source, each only once."""

@@ -4,7 +4,7 @@ from typing import Annotated, ClassVar
 
 from freepath.config.base import Kind
 from freepath.config.models import Factor, Point, by_kind
-from freepath.config.rules import OneOrMore
+from freepath.config.rules import OneOrMore, Text
 
 Spectrum = Annotated[tuple[Factor, ...], OneOrMore()]
 
@@ -41,4 +41,14 @@ class PointInEnvironment(PointLight):
     """The environment's radiance; one number, or one a channel."""
 
 
-LIGHTS = by_kind(Dark, Uniform, PointLight, PointInEnvironment)
+class Image(Kind):
+    """An environment from an image by latitude and longitude, with +z at its top."""
+
+    kind: ClassVar[str] = "image"
+    file: Annotated[str, Text("a file name")]
+    """Of floating-point numbers; looked for beside the config, then in $FREEPATH_VOLUMES."""
+    scale: Factor = 1.0
+    """Makes radiance of its values."""
+
+
+LIGHTS = by_kind(Dark, Uniform, PointLight, PointInEnvironment, Image)

@@ -9,7 +9,7 @@ from freepath.config.lights import LIGHTS, Uniform
 from freepath.config.models import MAJORANTS, MEDIA, Fraction, Global, Seed
 from freepath.config.quantity import CountOr, Number
 from freepath.config.rays import RAYS, Orthographic
-from freepath.config.rules import Choice, OneOrMore, Text, expected
+from freepath.config.rules import Choice, Flag, OneOrMore, Text, expected
 from freepath.errors import Problem
 from pydantic import (
     Field,
@@ -163,6 +163,8 @@ class Config(Model):
     """Cases to remove from the matrix."""
     stop: Stop = Stop()
     """When to stop measuring a case."""
+    render: Annotated[bool, Flag()] = False
+    """Whether each case of orthographic or perspective rays is written as a picture too."""
 
     _document: Document | None = PrivateAttr(None)
     _overridden: frozenset[str] = PrivateAttr(frozenset())

@@ -6,5 +6,15 @@ from freepath.scene.medium import Medium
 from freepath.scene.radiance import path_reference
 from freepath.scene.rays import make_rays
 from freepath.scene.references import reference
+from freepath.scene.sky import Sky, read_sky
 
-__all__ = ["Medium", "build_medium", "make_rays", "path_reference", "reference", "segments"]
+__all__ = [
+    "Medium",
+    "Sky",
+    "build_medium",
+    "make_rays",
+    "path_reference",
+    "read_sky",
+    "reference",
+    "segments",
+]

@@ -8,20 +8,24 @@ import numpy as np
 from freepath.scene.medium import Array, Medium
 from freepath.scene.references import free_path, transmittance
 from freepath.scene.scaled import Scaled
+from freepath.scene.sky import Sky
 
 POINTS = 400
 """Of the Gauss-Legendre rule along a ray, in the angle that the light sees it under."""
 
 
-def path_reference(case: Any, medium: Medium, segments: Array) -> Array | None:
+def path_reference(
+    case: Any, medium: Medium, segments: Array, sky: Sky | None = None
+) -> Array | None:
     """Return what a case of radiance or path_length should give for segments (N, 7).
 
     As (N,) or (N, channels) float64; None where there is no closed form. There is one where nothing
     scatters, where nothing is absorbed in a uniform environment, and for single scattering of a
-    point light's in a homogeneous medium.
+    point light's in a homogeneous medium. `sky` is the image that lights the case.
     """
+    outside = None if sky is None else sky.radiance(_directions(medium, segments))
     each = [
-        _of_channel(case, Scaled(medium, factor), segments, channel)
+        _of_channel(case, Scaled(medium, factor), segments, channel, outside)
         for channel, factor in enumerate(medium.channels)
     ]
     if any(one is None for one in each):
@@ -29,7 +33,14 @@ def path_reference(case: Any, medium: Medium, segments: Array) -> Array | None:
     return each[0] if len(each) == 1 else np.stack(each, axis=1)
 
 
-def _of_channel(case: Any, medium: Medium, segments: Array, channel: int) -> Array | None:
+def _directions(medium: Medium, segments: Array) -> Array:
+    """Return the directions of segments (N, 7) in the world, (N, 3)."""
+    return segments[:, 3:6] @ np.linalg.inv(medium.to_medium[:, :3]).T
+
+
+def _of_channel(
+    case: Any, medium: Medium, segments: Array, channel: int, outside: Array | None
+) -> Array | None:
     albedo = _value(case.medium.albedo, channel)
     emission = _value(case.medium.emission, channel)
     radiance = _value(getattr(case.light, "radiance", (0.0,)), channel)
@@ -38,10 +49,14 @@ def _of_channel(case: Any, medium: Medium, segments: Array, channel: int) -> Arr
         return free_path(medium, segments) if albedo == 0 or case.scatterings == 0 else None
     if albedo == 0 or case.scatterings == 0:
         through = transmittance(medium, segments)
-        return (1 - albedo) * emission * (1 - through) + radiance * through
-    if albedo == 1 and case.scatterings == "unlimited" and intensity == 0:
+        seen = radiance if outside is None else outside[:, channel]
+        return (1 - albedo) * emission * (1 - through) + seen * through
+    same = outside is None
+    if same and emission == radiance == intensity == 0:
+        return np.zeros(len(segments))
+    if same and albedo == 1 and case.scatterings == "unlimited" and intensity == 0:
         return np.full(len(segments), radiance)
-    single = case.scatterings == 1 and medium.kernel == "homogeneous"
+    single = same and case.scatterings == 1 and medium.kernel == "homogeneous"
     if single and emission == 0 and radiance == 0 and case.medium.phase != "rod":
         return albedo * intensity * _single_scattering(case, medium, segments)
     return None
