@@ -143,6 +143,9 @@ class Rig:
         """The one case of a config; media and majorants may be given by their names here."""
         axes["medium"] = _named(MEDIA, axes["medium"])
         axes["majorant"] = _named(MAJORANTS, axes.get("majorant", "global"))
+        if self.device.info.loop_limit:
+            # llvmpipe takes minutes to compile wider vectors than its own
+            axes["lanes"] = self.device.info.lanes
         # JSON is YAML
         seed = self.seed if seed is None else seed
         text = json.dumps({"name": "check", "seed": seed, "rays": rays, "matrix": axes})

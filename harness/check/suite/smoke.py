@@ -1,0 +1,41 @@
+"""A few paths of each tracker: what even an interpreter, which checks every access, can fly."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from freepath.catalog import Catalog, Tracker
+from freepath.check.identities import check_clean
+from freepath.check.model import TINY, Check, of_tracker
+from freepath.check.rig import Rig
+from freepath.check.suite.common import FEW, everyone, fly, knows_depth
+from freepath.check.verdict import demand
+
+SAMPLES = 4
+
+
+def checks(catalog: Catalog) -> Iterator[Check]:
+    """One of each tracker."""
+    for tracker in catalog.trackers.values():
+        if everyone(tracker):
+            yield Check(
+                f"smoke/{tracker.name}",
+                ("fast", "smoke", TINY, tracker.name),
+                "A read beyond an array or of what nobody has written gives right answers until it "
+                "does not: an interpreter must have no complaint, and paths must end on their ray.",
+                of_tracker(tracker, few_paths),
+                kernels=f"smoke/{tracker.name}",
+            )
+
+
+def few_paths(rig: Rig, alpha: float, tracker: Tracker) -> None:
+    """Sixteen rays, four samples of each, one lane."""
+    medium = "exponential" if knows_depth(tracker) else "trilinear"
+    flight = fly(rig, tracker, medium, rays=FEW, lanes=1)
+    samples = flight.record(SAMPLES)
+    check_clean(samples.round, bounded=True)
+
+    demand(np.isfinite(samples.score).all(), "a score is no number")
+    beyond = samples.t > flight.segments[:, 6:] * (1.0 + 16.0 * flight.rounding)
+    demand(not beyond.any() and (samples.t >= 0.0).all(), "a path ends beyond its ray")
