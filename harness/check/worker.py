@@ -33,6 +33,8 @@ class Setting:
     """A selector, or None for the first."""
     trackers: Sequence[Path] = ()
     seed: int = SEED
+    arithmetic: str = "strict"
+    """Of kernels, where a check does not say."""
 
 
 def serve(connection: Connection, setting: Setting) -> None:
@@ -47,6 +49,7 @@ def serve(connection: Connection, setting: Setting) -> None:
             known = catalog.load(setting.trackers)
             device = open_devices([setting.device] if setting.device else [])[0]
             rig = Rig(device, known, Path(folder), setting.seed)
+            rig = rig.with_arithmetic(setting.arithmetic)
         except FreepathError as error:
             connection.send(str(error))
             return

@@ -92,6 +92,12 @@ def _add_running(check: Any) -> None:
     )
     check.add_argument("--seed", type=_seed, metavar="N", help="another seed than the usual")
     check.add_argument(
+        "--arithmetic",
+        choices=["strict", "fast"],
+        default="strict",
+        help="what kernels are built with where a check does not say; fast: see what it breaks",
+    )
+    check.add_argument(
         "--ctest",
         type=Path,
         metavar="DIR",
@@ -158,6 +164,7 @@ def _chosen(options: Namespace) -> list[tuple[int, Check]]:
 def _handed_on(options: Namespace) -> list[str]:
     """The arguments that ctest passes to each check."""
     handed = ["--output-on-failure", "--timeout", f"{options.timeout:g}"]
+    handed += ["--arithmetic", options.arithmetic]
     for device in options.device:
         handed += ["-d", device]
     for folder in options.trackers:
@@ -179,6 +186,7 @@ def _run(options: Namespace, chosen: list[tuple[int, Check]]) -> int:
             repeat=options.repeat,
             seed=options.seed,
             trackers=options.trackers,
+            arithmetic=options.arithmetic,
             stop_on_failure=options.stop_on_failure,
             output_on_failure=options.output_on_failure,
             verbose=options.verbose,
@@ -245,7 +253,7 @@ def _run_in_processes(options: Namespace, parts: Parts, running: Session) -> lis
 def _for_drivers(options: Namespace) -> list[str]:
     """The arguments that the process of a driver gets, without its devices."""
     arguments = ["-j", str(options.parallel), "--timeout", f"{options.timeout:g}"]
-    arguments += ["--repeat", str(options.repeat)]
+    arguments += ["--repeat", str(options.repeat), "--arithmetic", options.arithmetic]
     lists = {"-L": options.label_regex, "-LE": options.label_exclude, "--trackers": []}
     lists["--trackers"] = [str(folder.resolve()) for folder in options.trackers]
     lists |= {"-R": [options.tests_regex], "-E": [options.exclude_regex], "--seed": [options.seed]}

