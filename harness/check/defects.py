@@ -16,12 +16,13 @@ from freepath.check import registry
 from freepath.check.model import LEVEL, Check
 from freepath.check.planted import KERNELS, Defect
 from freepath.check.planted_numbers import NUMBERS
+from freepath.check.planted_paths import PATHS
 from freepath.check.rig import Change, Rig
 from freepath.check.verdict import Failure
 from freepath.device import open_devices
 from freepath.errors import FAILED
 
-DEFECTS = KERNELS + NUMBERS
+DEFECTS = KERNELS + NUMBERS + PATHS
 
 
 def caught(rig: Rig, defect: Defect, check: Check) -> str:

@@ -18,6 +18,7 @@ MOST_CHECKS = 2000
 what else is selected nor on which trackers were added."""
 LEVEL = sidak(BUDGET, MOST_CHECKS)
 
+TINY = "tiny"
 GROUPS = {
     "random-numbers": "generators, and samplers at the ends of their domain",
     "empty-full": "nothing, one voxel, and all voxels alike",
@@ -31,6 +32,8 @@ GROUPS = {
     "contrast": "neighbours of 0 and a million, denormal densities, half floats",
     "accumulation": "a thousand million samples",
     "long-runs": "numbers beyond 32 bits, launches that are cut",
+    "scattering": "furnaces, emission, phase functions, lights beside a ray and far away",
+    "channels": "several channels on one path: a thousand to one, nothing, their albedos",
     "bad-input": "volumes that must be refused",
 }
 """The hard cases, by group: each is a label."""
@@ -38,6 +41,8 @@ LABELS = {
     "fast": "takes little time together: the first thing to run",
     "slow": "the rest",
     "minutes": "takes minutes alone",
+    TINY: "so little that an interpreter of kernels gets through it",
+    "smoke": "each tracker, a few paths",
     "identity": "means agree with float64",
     "distribution": "free paths have the distribution of the medium",
     "moments": "variances and costs agree with what is known of them",
@@ -71,6 +76,12 @@ class Check:
     """The reason why it cannot be made on a device, or ''."""
     kernels: str = field(default="", compare=False)
     """Checks of the same ones are run by the same process, which compiles them once."""
+
+    def reason_against(self, info: DeviceInfo) -> str:
+        """Why it cannot be made on a device, or ''."""
+        if info.interpreted and TINY not in self.labels:
+            return "an interpreter gets checks with the label tiny, and no others"
+        return self.applies(info)
 
     @property
     def in_tests(self) -> bool:

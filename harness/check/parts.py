@@ -14,13 +14,14 @@ from freepath.source import Source
 class Lanes:
     """Runs a few lines of OpenCL C on arrays, element by element, in lanes."""
 
-    def __init__(self, rig: Rig, lanes: int, logarithm: str = "log_polynomial"):
+    def __init__(self, rig: Rig, lanes: int, logarithm: str = "log_polynomial", more: str = ""):
         self._rig, self._lanes = rig, lanes
         self._options = ("-cl-single-precision-constant",)
         shape = "scalar" if lanes == 1 else "vector"
         files = [f"lanes/{shape}", "lanes/common", f"math/{logarithm}", "lanes/rng"]
         defines = f"#define LANES {lanes}\n#define SCALAR float\n#define INTEGER int\n"
         self._head = defines + "\n".join(kernel_files.read(name).code for name in files)
+        self._head += f"\n{more}"
 
     def __call__(
         self, body: str, inputs: Any, outputs: Sequence[str], count: int, draws: int = 1

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from freepath.catalog import Catalog
 from freepath.check.model import Check
 from freepath.check.suite import (
+    channels,
     empty_full,
     geometry,
     identity,
@@ -16,11 +17,25 @@ from freepath.check.suite import (
     majorants,
     moments,
     random_numbers,
+    scattering,
+    smoke,
     thickness,
 )
 from freepath.errors import NothingMatchedError, UsageError
 
-SUITE = (identity, moments, random_numbers, empty_full, thickness, majorants, geometry, long_runs)
+SUITE = (
+    smoke,
+    identity,
+    moments,
+    random_numbers,
+    empty_full,
+    thickness,
+    majorants,
+    geometry,
+    long_runs,
+    scattering,
+    channels,
+)
 
 
 def checks(catalog: Catalog) -> list[Check]:

@@ -111,6 +111,7 @@ class Rig:
         self.catalog = catalog
         self.folder = folder
         self.seed = seed
+        self.arithmetic = "strict"
         self._changes: tuple[Change, ...] = ()
         self._programs: dict[str, Program] = {}
         self._media: dict[str, Medium] = {}
@@ -125,6 +126,12 @@ class Rig:
         """The same rig with other random numbers."""
         rig = copy(self)
         rig.seed = seed
+        return rig
+
+    def with_arithmetic(self, name: str) -> Rig:
+        """The same rig with another arithmetic of flights that do not name theirs."""
+        rig = copy(self)
+        rig.arithmetic = name
         return rig
 
     def with_change(self, change: Change) -> Rig:
@@ -142,8 +149,12 @@ class Rig:
 
     def case(self, *, rays: dict = CHORDS, seed: int | None = None, **axes: Any) -> Case:
         """The one case of a config; media and majorants may be given by their names here."""
+        axes.setdefault("arithmetic", self.arithmetic)
         axes["medium"] = _named(MEDIA, axes["medium"])
         axes["majorant"] = _named(MAJORANTS, axes.get("majorant", "global"))
+        if self.device.info.loop_limit:
+            # llvmpipe takes minutes to compile wider vectors than its own
+            axes["lanes"] = self.device.info.lanes
         # JSON is YAML
         seed = self.seed if seed is None else seed
         text = json.dumps({"name": "check", "seed": seed, "rays": rays, "matrix": axes})

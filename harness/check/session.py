@@ -42,6 +42,7 @@ class Options:
     repeat: int = 1
     seed: int | None = None
     trackers: Sequence[Path] = ()
+    arithmetic: str = "strict"
     stop_on_failure: bool = False
     output_on_failure: bool = False
     verbose: bool = False
@@ -68,7 +69,7 @@ class Session:
         ]
         progress = printing.Progress(self.chosen, len(tasks))
         setting = Setting(f"{info.platform} / {info.name} / {info.driver_version}")
-        setting = replace(setting, trackers=tuple(options.trackers))
+        setting = replace(setting, trackers=tuple(options.trackers), arithmetic=options.arithmetic)
         if options.seed is not None:
             setting = replace(setting, seed=options.seed)
         pool = Pool(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import tempfile
 import time
 import traceback
@@ -17,7 +18,8 @@ from freepath.check.outcome import FAILED, PASSED, SKIPPED
 from freepath.check.rig import SEED, Rig
 from freepath.check.verdict import Failure, NotApplicable
 from freepath.device import open_devices
-from freepath.errors import FreepathError
+from freepath.drivers import INTERPRETER_LOG
+from freepath.errors import DriverLimitError, FreepathError
 
 STRIDE = 1_000_003
 """Between the seeds of repeats: more than the checks add to them."""
@@ -31,6 +33,8 @@ class Setting:
     """A selector, or None for the first."""
     trackers: Sequence[Path] = ()
     seed: int = SEED
+    arithmetic: str = "strict"
+    """Of kernels, where a check does not say."""
 
 
 def serve(connection: Connection, setting: Setting) -> None:
@@ -39,10 +43,13 @@ def serve(connection: Connection, setting: Setting) -> None:
     The first message is '' or why the device cannot be used.
     """
     with tempfile.TemporaryDirectory(prefix="freepath-check-") as folder:
+        # every process of an interpreter begins its log anew
+        os.environ[INTERPRETER_LOG] = str(Path(folder) / "log")
         try:
             known = catalog.load(setting.trackers)
             device = open_devices([setting.device] if setting.device else [])[0]
             rig = Rig(device, known, Path(folder), setting.seed)
+            rig = rig.with_arithmetic(setting.arithmetic)
         except FreepathError as error:
             connection.send(str(error))
             return
@@ -61,13 +68,16 @@ def run(rig: Rig, check: Check) -> tuple[str, float, str]:
 
 
 def _verdict(rig: Rig, check: Check) -> tuple[str, str]:
-    reason = check.applies(rig.device.info)
+    reason = check.reason_against(rig.device.info)
     if reason:
         return SKIPPED, reason
     try:
         check.run(rig, LEVEL)
     except NotApplicable as error:
         return SKIPPED, str(error)
+    except DriverLimitError as error:
+        # of a driver without limits it is a fault, whosever it is
+        return SKIPPED if rig.device.info.loop_limit else FAILED, str(error)
     except (Failure, FreepathError) as error:
         return FAILED, str(error)
     except Exception:

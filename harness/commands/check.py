@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 import shtab
 from freepath.arguments import add_device, add_trackers
-from freepath.errors import FAILED, DeviceError, NothingMatchedError
+from freepath.errors import FAILED, INTERRUPTED, DeviceError, NothingMatchedError
 
 if TYPE_CHECKING:
     from freepath.check.model import Check
     from freepath.check.outcome import Outcome
     from freepath.check.session import Session
+    from freepath.selection import Parts
 
 
 def add(commands: Any) -> None:
@@ -91,11 +92,19 @@ def _add_running(check: Any) -> None:
     )
     check.add_argument("--seed", type=_seed, metavar="N", help="another seed than the usual")
     check.add_argument(
+        "--arithmetic",
+        choices=["strict", "fast"],
+        default="strict",
+        help="what kernels are built with where a check does not say; fast: see what it breaks",
+    )
+    check.add_argument(
         "--ctest",
         type=Path,
         metavar="DIR",
         help="write DIR/CTestTestfile.cmake, so that ctest runs these checks, and stop",
     ).complete = shtab.DIRECTORY
+    # given to the process of a driver: who started it shows them all
+    check.add_argument("--outcomes", type=Path, help=argparse.SUPPRESS)
 
 
 def _count(text: str) -> int:
@@ -155,6 +164,7 @@ def _chosen(options: Namespace) -> list[tuple[int, Check]]:
 def _handed_on(options: Namespace) -> list[str]:
     """The arguments that ctest passes to each check."""
     handed = ["--output-on-failure", "--timeout", f"{options.timeout:g}"]
+    handed += ["--arithmetic", options.arithmetic]
     for device in options.device:
         handed += ["-d", device]
     for folder in options.trackers:
@@ -163,9 +173,11 @@ def _handed_on(options: Namespace) -> list[str]:
 
 
 def _run(options: Namespace, chosen: list[tuple[int, Check]]) -> int:
-    from freepath.check import files, printing, session
+    from freepath import selection
+    from freepath.check import everywhere, files, session
 
-    infos = session.devices_of(options.device)
+    parts = selection.processes_of(options.device)
+    infos = [] if parts else session.devices_of(options.device)
     running = session.Session(
         chosen,
         session.Options(
@@ -174,22 +186,38 @@ def _run(options: Namespace, chosen: list[tuple[int, Check]]) -> int:
             repeat=options.repeat,
             seed=options.seed,
             trackers=options.trackers,
+            arithmetic=options.arithmetic,
             stop_on_failure=options.stop_on_failure,
             output_on_failure=options.output_on_failure,
             verbose=options.verbose,
         ),
-        lambda line: print(line, flush=True),
+        _tell,
     )
-    unusable = []
+    unusable: list[str] = []
     try:
+        if parts:
+            unusable += _run_in_processes(options, parts, running)
         for info in infos:
             unusable += _run_on(running, info)
     finally:
         # also after Ctrl-C: what is known is kept
-        files.keep_failed(running.failed)
+        if options.outcomes:
+            everywhere.write(options.outcomes, running.outcomes, unusable)
+        else:
+            files.keep_failed(running.failed)
         if options.output_junit:
             files.write_junit(options.output_junit, running.outcomes)
-    if len(infos) > 1:
+    return _judge(options, running, unusable)
+
+
+def _judge(options: Namespace, running: Session, unusable: list[str]) -> int:
+    """Print what is to be said of all devices together; returns the exit code."""
+    from freepath.check import printing
+
+    failed = FAILED if running.failed or unusable else 0
+    if options.outcomes:
+        return failed
+    if len(running.outcomes) > 1:
         print(f"\n{printing.matrix(running.outcomes)}")
     for message in unusable:
         print(f"freepath: {message}", file=sys.stderr)
@@ -200,7 +228,39 @@ def _run(options: Namespace, chosen: list[tuple[int, Check]]) -> int:
         if not options.output_on_failure:
             hint = 'Use "--rerun-failed --output-on-failure" to see what was measured.'
             print(hint, file=sys.stderr)
-    return FAILED if running.failed or unusable else 0
+    return failed
+
+
+def _tell(line: str) -> None:
+    print(line, flush=True)
+
+
+def _run_in_processes(options: Namespace, parts: Parts, running: Session) -> list[str]:
+    """Run all on each driver's devices, in its process; returns what could not be used."""
+    from freepath.check import everywhere
+
+    unusable: list[str] = []
+    for outcomes, messages, code in everywhere.run(parts, _for_drivers(options), _tell):
+        running.outcomes |= outcomes
+        unusable += messages
+        if code == INTERRUPTED:
+            raise KeyboardInterrupt
+        if options.stop_on_failure and (running.failed or unusable):
+            break
+    return unusable
+
+
+def _for_drivers(options: Namespace) -> list[str]:
+    """The arguments that the process of a driver gets, without its devices."""
+    arguments = ["-j", str(options.parallel), "--timeout", f"{options.timeout:g}"]
+    arguments += ["--repeat", str(options.repeat), "--arithmetic", options.arithmetic]
+    lists = {"-L": options.label_regex, "-LE": options.label_exclude, "--trackers": []}
+    lists["--trackers"] = [str(folder.resolve()) for folder in options.trackers]
+    lists |= {"-R": [options.tests_regex], "-E": [options.exclude_regex], "--seed": [options.seed]}
+    for flag, values in lists.items():
+        arguments += [word for value in values if value is not None for word in (flag, str(value))]
+    flags = ("verbose", "rerun_failed", "stop_on_failure", "output_on_failure")
+    return arguments + [f"--{flag.replace('_', '-')}" for flag in flags if getattr(options, flag)]
 
 
 def _run_on(running: Session, info: Any) -> list[str]:

@@ -18,7 +18,9 @@ static real sample_cosine(const Scene *scene, Rng *rng)
 static real phase(const Scene *scene, const real cosine)
 {
     const SCALAR g = scene->optics.g;
-    /* (1 - g)^2 + 2 g (1 - cosine) keeps its digits where g and the cosine are near 1 */
-    const real square = (SCALAR)(1 - g) * (1 - g) + (SCALAR)2 * g * ((SCALAR)1 - cosine);
-    return (SCALAR)0.07957747154594767 * ((SCALAR)1 - g * g) * rsqrt(square) / square;
+    /* (1 - |g|)^2 + 2 |g| (1 - cosine), of the cosine to the lobe: its digits are kept where that is sharp */
+    const SCALAR sharp = fabs(g);
+    const real inside = g < (SCALAR)0 ? (SCALAR)1 + cosine : (SCALAR)1 - cosine;
+    const real square = ((SCALAR)1 - sharp) * ((SCALAR)1 - sharp) + (SCALAR)2 * sharp * inside;
+    return (SCALAR)0.07957747154594767 * ((SCALAR)1 - sharp) * ((SCALAR)1 + sharp) * rsqrt(square) / square;
 }

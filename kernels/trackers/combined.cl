@@ -19,7 +19,8 @@ static real weight_of_angular(const Path *path, const Scene *scene, const real t
 {
     const real angular = scene->tracker.share * density;
     const real other = ((SCALAR)1 - scene->tracker.share) * path->state.rate * exp(-path->state.rate * t);
-    return angular / (angular + other);
+    /* not a share of the sum: the density is infinite where a path has no length */
+    return (SCALAR)1 / ((SCALAR)1 + other / angular);
 }
 
 static void begin(Path *path, const Scene *scene, Rng *rng)

@@ -16,7 +16,7 @@ def those(*prefixes):
 
     @pytest.mark.parametrize("check", chosen, ids=lambda check: check.name)
     def test(rig, check):
-        reason = check.applies(rig.device.info)
+        reason = check.reason_against(rig.device.info)
         if reason:
             pytest.skip(reason)
         try:

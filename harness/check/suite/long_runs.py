@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from freepath.catalog import Catalog
 from freepath.check.identities import check_clean, check_same_samples
-from freepath.check.model import Check
+from freepath.check.model import TINY, Check
 from freepath.check.rig import Rig
 from freepath.check.suite.common import UPWARD
 from freepath.check.verdict import Failure, demand, require
@@ -27,7 +27,7 @@ def checks(catalog: Catalog) -> Iterator[Check]:
     for name, make in BAD.items():
         yield Check(
             f"hard/bad-input/{name}",
-            ("fast", "hard", "bad-input"),
+            ("fast", "hard", "bad-input", TINY),
             "A volume that is not what it should be becomes an answer that looks like one: it is "
             "refused, with its file, and the first voxel and count where values are wrong.",
             _refused(make, name),

@@ -1,0 +1,121 @@
+"""Defects of paths that scatter and of paths of several channels."""
+
+from __future__ import annotations
+
+from freepath.check.planted import HARD, Defect
+
+SCATTERING = f"{HARD}/scattering"
+CHANNELS = f"{HARD}/channels"
+SINGLE = f"{SCATTERING}/single/ratio-g-0.0/delta"
+
+PATHS = (
+    Defect(
+        "a phase function that is not normalised",
+        "return (real)(SCALAR)0.0795",
+        "return (real)(SCALAR)0.085",
+        SINGLE,
+    ),
+    Defect(
+        "a sharp phase function that loses its digits backwards",
+        "((SCALAR)1 - sharp) * ((SCALAR)1 - sharp) + (SCALAR)2 * sharp * inside",
+        "((SCALAR)1 - g) * ((SCALAR)1 - g) + (SCALAR)2 * g * ((SCALAR)1 - cosine)",
+        f"{SCATTERING}/phase/g--0.999",
+    ),
+    Defect(
+        "a cosine that is not drawn as it is evaluated",
+        "top / (base * base)",
+        "top / base",
+        f"{SCATTERING}/phase/g-0.3",
+    ),
+    Defect(
+        "a distance to the light without its square",
+        "/ (distance * distance);",
+        "/ distance;",
+        SINGLE,
+    ),
+    Defect(
+        "an emission collected twice",
+        "absorbed * scene->optics.emission[c]",
+        "2 * absorbed * scene->optics.emission[c]",
+        f"{SCATTERING}/emission/delta",
+    ),
+    Defect(
+        "a scattering albedo left out",
+        "= scene->optics.albedo[c] * scene->light.intensity[c];",
+        "= scene->light.intensity[c];",
+        SINGLE,
+    ),
+    Defect(
+        "albedos of channels swapped",
+        "= scene->optics.albedo[c] * scene->light.intensity[c];",
+        "= scene->optics.albedo[CHANNELS - 1 - c] * scene->light.intensity[c];",
+        f"{CHANNELS}/albedo/history_average",
+    ),
+    Defect(
+        "a shadow ray that goes on behind the light",
+        "shadow.length = smaller(shadow.length, distance);",
+        "",
+        f"{SCATTERING}/light/inside/equiangular",
+    ),
+    Defect(
+        "a ray that its next path does not start on",
+        "    restore_ray(path, ended);",
+        "",
+        SINGLE,
+    ),
+    Defect(
+        "an environment that is seen from every collision",
+        "see_environment(path, scene, ended & path->escaped);",
+        "see_environment(path, scene, ended);",
+        f"{SCATTERING}/furnace/homogeneous-tau-1-forward/delta",
+    ),
+    Defect(
+        "a new direction that is not of unit length",
+        "ahead.x * cosine + along *",
+        "ahead.x + along *",
+        f"{SCATTERING}/length/tau-3.0-g-0.7/delta",
+    ),
+    Defect(
+        "a weight lost in roulette",
+        "path->weight / largest",
+        "path->weight",
+        f"{SCATTERING}/rod/albedo-0.3-tau-2.0/delta",
+    ),
+    Defect(
+        "a combined sample that is not weighted",
+        "share * end_sigma / (scene->tracker.share * path->state.density)",
+        "end_sigma / path->state.density",
+        f"{SCATTERING}/light/outside/combined",
+    ),
+    Defect(
+        "a density of equal angles without the light's distance",
+        "pass.off / (pass.angle *",
+        "(SCALAR)1 / (pass.angle *",
+        f"{SCATTERING}/light/outside/equiangular",
+    ),
+    # channels
+    Defect(
+        "a spectral weight without the majorant's share",
+        "const real scale = (ends + null)",
+        "const real scale = (SCALAR)0.98 * (ends + null)",
+        f"{CHANNELS}/mean/homogeneous-1.0/history_average",
+    ),
+    Defect(
+        "a probability that the weight is not divided by",
+        "(choose(collided, ends, null) * path->majorant)",
+        "(null * path->majorant)",
+        f"{CHANNELS}/free-path/history_average",
+    ),
+    Defect(
+        "channels swapped",
+        "const real extinction = sigma * scene->channels.extinction[c];",
+        "const real extinction = sigma * scene->channels.extinction[CHANNELS - 1 - c];",
+        f"{CHANNELS}/free-path/history_average",
+    ),
+    Defect(
+        "a history that is left out",
+        "extinction *= fabs(path->state.tint[c]);",
+        "",
+        f"{CHANNELS}/bounded/1-1000",
+    ),
+)

@@ -1,0 +1,5 @@
+"""Paths that scatter, and channels."""
+
+from checks.support import those
+
+test_check = those("hard/scattering/", "hard/channels/")

@@ -1,0 +1,5 @@
+"""A few paths of each tracker."""
+
+from checks.support import those
+
+test_check = those("smoke/")
