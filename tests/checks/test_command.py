@@ -40,7 +40,7 @@ def call(work, capsys):
 def test_listed(call):
     code, out, _ = call("-N", "-V", "-R", QUICK)
     assert code == 0
-    assert re.search(r"Labels: fast hard bad-input\n  Test +#\d+: hard/bad-input/nan\n", out)
+    assert re.search(r"Labels: fast hard bad-input tiny\n  Test +#\d+: hard/bad-input/nan\n", out)
     assert "refused" in out
     assert out.endswith("Total Tests: 3\n")
 

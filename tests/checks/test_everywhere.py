@@ -97,3 +97,12 @@ def test_what_a_device_cannot_do_is_no_failure(rig, monkeypatch):
     slow = dataclasses.replace(plain, interpreted=True)
     assert "interpreter" in check.reason_against(slow)
     assert not dataclasses.replace(check, labels=("fast", TINY)).reason_against(slow)
+
+
+def test_another_arithmetic_is_that_of_flights_that_name_none(rig):
+    """And what is built with it is another program."""
+    axes = {"tracker": "ratio", "estimand": "transmittance", "medium": "homogeneous", "lanes": 1}
+    fast = rig.with_arithmetic("fast")
+    assert "-cl-fast-relaxed-math" in fast.flight(**axes).runner.program.source.options
+    named = fast.flight(**axes, arithmetic="strict").runner.program.source.options
+    assert named == rig.flight(**axes).runner.program.source.options
