@@ -29,6 +29,7 @@ ORDER = (
     ("sweep", "report", "compare"),
     ("session", "arguments", "device_setup"),
     ("api", "check"),
+    ("candidate",),
     ("commands",),
     ("cli",),
     ("__main__",),

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from freepath.catalog import Catalog
 from freepath.check.model import Check
 from freepath.check.suite import (
+    counted,
     empty_full,
     geometry,
     identity,
@@ -20,7 +21,17 @@ from freepath.check.suite import (
 )
 from freepath.errors import NothingMatchedError, UsageError
 
-SUITE = (identity, moments, random_numbers, empty_full, thickness, majorants, geometry, long_runs)
+SUITE = (
+    identity,
+    moments,
+    random_numbers,
+    empty_full,
+    thickness,
+    majorants,
+    geometry,
+    long_runs,
+    counted,
+)
 
 
 def checks(catalog: Catalog) -> list[Check]:
