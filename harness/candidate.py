@@ -24,12 +24,12 @@ from freepath.check.verdict import NotApplicable
 from freepath.device import Device, DeviceInfo
 from freepath.errors import CatalogError
 from freepath.report.data import Report
-from freepath.results import ResultFolder
+from freepath.results import CHECKS, ResultFolder
 from freepath.table import seconds
 
 RELATIVES = 4
 """Trackers that a candidate is measured beside."""
-CONFIG, CHECKS = "try.yaml", "checks.json"
+CONFIG = "try.yaml"
 SEED = 7
 ATMOSPHERE = {"exponential": {"sigma_t": 5, "scale_height": 0.3}}
 CLOUD = {"cloud": {"resolution": 64, "sigma_t": 20}}
@@ -98,14 +98,14 @@ def keep(outcomes: Sequence[Outcome], folder: Path) -> Path:
     return path
 
 
-def relatives(known: Catalog, tracker: Tracker, at_most: int = RELATIVES) -> list[Tracker]:
+def relatives(known: Catalog, tracker: Tracker) -> list[Tracker]:
     """The trackers most like it: that share estimands, and what they need and promise."""
     others = [
         other
         for other in known.trackers.values()
         if other.name != tracker.name and set(other.estimands) & set(tracker.estimands)
     ]
-    return sorted(others, key=lambda other: -_likeness(tracker, other))[:at_most]
+    return sorted(others, key=lambda other: -_likeness(tracker, other))[:RELATIVES]
 
 
 def _likeness(one: Tracker, other: Tracker) -> float:

@@ -8,7 +8,6 @@ from freepath.check import registry
 from freepath.check.model import LEVEL
 from freepath.check.verdict import Failure
 from freepath.cli import main
-
 from support.slips import NAME, RIGHT, SLIPS
 
 KEY = "threshold: {default"
@@ -67,7 +66,7 @@ def test_accepted_and_measured(call, file, monkeypatch):
         lambda *given, every: [one for one in chosen(*given, every=every) if one[1].name in few],
     )
     monkeypatch.setattr(candidate, "RELATIVES", 1)
-    monkeypatch.setattr(candidate, "CLOUD", {"homogeneous": {"sigma_t": 1}})
+    monkeypatch.setattr(candidate, "CLOUD", candidate.ATMOSPHERE)
     monkeypatch.setattr(candidate, "STOP", {"samples": 64})
     code, text = call(file, "-o", "out")
     assert code == 0, text
@@ -94,7 +93,9 @@ def test_rejected_with_what_was_measured(call, file, monkeypatch):
     assert code == 8
     assert "wrong: 1 of 1 checks failed" in text
     assert "lookups/counted/newcomer" in text
-    assert "newcomer.cl:19: expected sigma_t" in text
+    lines = SLIPS[7].text.splitlines()
+    (at,) = (number for number, line in enumerate(lines, 1) if "sigma_t_at(" in line)
+    assert f"newcomer.cl:{at}: expected sigma_t" in text
     (one,) = json.loads((file.parent / "out" / "checks.json").read_text())
     assert one["status"] == "Failed"
 

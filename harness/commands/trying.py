@@ -121,7 +121,9 @@ def _check(
 
     chosen = candidate.checks_of(known, tracker, every=options.every_check)
     which = "all" if options.every_check else "fast"
-    console.print(f"{len(chosen)} checks ({which}) that its front matter calls for", highlight=False)
+    console.print(
+        f"{len(chosen)} checks ({which}) that its front matter calls for", highlight=False
+    )
     processes = min(2, os.cpu_count() or 1)
     with console.status("checking") as status:
 

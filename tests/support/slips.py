@@ -46,7 +46,7 @@ SLIPS = (
     Slip(
         "a weight too small by 1 %",
         ((NULL, f"(SCALAR)0.99 * {NULL}"),),
-        ALL + "homogeneous/global",
+        ALL + "trilinear/grid",
     ),
     Slip(
         "a null probability with the wrong denominator",
@@ -72,7 +72,10 @@ SLIPS = (
         "the majorant of the first collision at all of them",
         (
             ("parameters:", "state: {first: real}\nparameters:"),
-            ("walk_begin(path, scene); }", "walk_begin(path, scene); path->state.first = (real)0; }"),
+            (
+                "walk_begin(path, scene); }",
+                "walk_begin(path, scene); path->state.first = (real)0; }",
+            ),
             (
                 f"    const real weight = path->weight * {NULL};",
                 "    const mask unknown = here & equal(path->state.first, (real)0);\n"
@@ -85,7 +88,7 @@ SLIPS = (
     Slip(
         "a uniform number that is used twice",
         (("bounding: false", "bounding: true"),),
-        ALL + "homogeneous/global",
+        ALL + "trilinear/grid",
         f"""{TENTATIVE}
 {SIGMA}
     const real u = uniform(rng);
