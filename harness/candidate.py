@@ -29,6 +29,8 @@ from freepath.table import seconds
 
 RELATIVES = 4
 """Trackers that a candidate is measured beside."""
+TIMEOUT_S = 60.0
+"""A fast check takes a second or two: one that takes this long hangs."""
 CONFIG = "try.yaml"
 SEED = 7
 ATMOSPHERE = {"exponential": {"sigma_t": 5, "scale_height": 0.3}}
@@ -87,7 +89,8 @@ def check(
     tell: Callable[[str], None],
 ) -> list[Outcome]:
     """Run checks of a tracker on a device, in processes of their own."""
-    options = checking.Options(processes=processes, trackers=(file,))
+    timeout = TIMEOUT_S if all("fast" in one.labels for _, one in chosen) else 5 * TIMEOUT_S
+    options = checking.Options(processes=processes, trackers=(file,), timeout=timeout)
     return checking.Session(chosen, options, tell).run(info)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import os
 import time
 from argparse import Namespace
@@ -10,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import shtab
-from freepath.arguments import add_device
+from freepath.arguments import add_device, positive
 from freepath.errors import FAILED
 
 if TYPE_CHECKING:
@@ -42,7 +41,7 @@ def add(commands: Any) -> None:
     ).complete = shtab.FILE
     trying.add_argument(
         "--sigma-t",
-        type=_extinction,
+        type=positive,
         default=1.0,
         metavar="X",
         help="extinction where the volume's density is 1 (default: 1)",
@@ -63,26 +62,16 @@ def add(commands: Any) -> None:
     )
 
 
-def _extinction(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = 0.0
-    if not 0.0 < value < 1e30:
-        raise argparse.ArgumentTypeError(f"expected a number above 0, got '{text}'")
-    return value
-
-
 def execute(options: Namespace) -> int:
     """Run it; returns the exit code."""
     from freepath import candidate, session
-    from freepath.commands.common import console_of
+    from freepath.commands.common import console_of, volume_of
     from freepath.device import open_devices
     from freepath.results import ResultFolder
 
     clock = session.Clock(time.perf_counter())
     known, tracker = candidate.read(options.tracker)
-    volume = _volume(options)
+    volume = volume_of(options.volume, options.sigma_t) if options.volume else None
     path = options.output or session.new_folder(f"try-{tracker.name}")
     folder = ResultFolder(path)
     device = open_devices(options.device)[0]
@@ -99,19 +88,6 @@ def execute(options: Namespace) -> int:
         candidate.sweep_text(tracker, candidate.relatives(known, tracker), volume), "utf-8"
     )
     return _measure(console, config, (known, tracker), device, folder, clock)
-
-
-def _volume(options: Namespace) -> dict[str, Any] | None:
-    """The volume as a config names it; raises VolumeError now, not after the checks."""
-    if options.volume is None:
-        return None
-    from freepath.errors import VolumeError
-    from freepath.scene.volumes import read_volume
-
-    if not options.volume.is_file():
-        raise VolumeError(f"{options.volume}: expected a volume, got no file")
-    read_volume(options.volume)
-    return {"file": str(options.volume.resolve()), "sigma_t": options.sigma_t}
 
 
 def _check(
