@@ -28,7 +28,7 @@ CELLS = (32, 16, 8, 4)
 TIGHTNESS = (1, 1.5, 2.5)
 SHARES = (0.25, 0.3, 0.2, 0.25)
 """Of the budget, for each round."""
-TRACKERS, CASES, FINALISTS = 5, 4, 3
+TRACKERS, CASES, FINALISTS = 5, 5, 5
 """How many are left after each round."""
 PRECISION = ({"error": "10%", "time_noise": "10%"},) * 3 + ({"error": "1%", "time_noise": "1%"},)
 LEAST_S = 0.05
