@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 from pathlib import Path
 from typing import Any
 
@@ -49,3 +50,14 @@ def add_trackers(command: Any) -> None:
         metavar="DIR",
         help="a folder with further trackers, one .cl file each; may be repeated",
     ).complete = shtab.DIRECTORY
+
+
+def positive(text: str) -> float:
+    """A finite number above 0, as the type of an argument."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 0.0 < value < 1e30:
+        raise argparse.ArgumentTypeError(f"expected a number above 0, got '{text}'")
+    return value

@@ -195,14 +195,15 @@ def is_identifier(name: Any) -> bool:
 
 
 def load(directories: Iterable[Path | str] = (), *, builtin: bool = True) -> Catalog:
-    """Load the trackers of freepath (unless not `builtin`) and of further folders of .cl files.
+    """Load the trackers of freepath (unless not `builtin`), of further folders and of .cl files.
 
     Raises CatalogError with every problem of every file.
     """
     files: list[Path] = _builtin_files() if builtin else []
     problems: list[Problem] = []
     for directory in directories:
-        found = sorted(Path(directory).glob("*.cl"))
+        given = Path(directory)
+        found = [given] if given.is_file() else sorted(given.glob("*.cl"))
         if not found:
             problem = "expected a folder with .cl files, got none"
             problems.append(Problem(str(directory), 0, 0, "", problem))

@@ -11,13 +11,25 @@ from contextlib import contextmanager
 from typing import Any
 
 import shtab
-from freepath.commands import check, compare, devices, listing, report, run, source
+from freepath.commands import (
+    check,
+    compare,
+    devices,
+    listing,
+    recommend,
+    report,
+    run,
+    source,
+    trying,
+)
 from freepath.errors import FAILED, INTERRUPTED, FreepathError
 from freepath.version import __version__
 
 COMMANDS = {
     "run": run,
     "check": check,
+    "recommend": recommend,
+    "try": trying,
     "report": report,
     "compare": compare,
     "source": source,
@@ -39,6 +51,8 @@ examples:
   freepath report out                       one HTML file of it, to look at
   freepath compare before after             what became slower, noisier or different
   freepath check -L fast -j 2               does this device compute what it should?
+  freepath recommend cloud.vdb --accuracy 1%   what to use in a volume of one's own
+  freepath try my_tracker.cl                is a new tracker right, and where does it pay?
   freepath source quick --case 3            the OpenCL C that case 3 runs
 """
 

@@ -14,6 +14,8 @@ from freepath.errors import FreepathError
 
 SCHEMA_VERSION = 2
 SUMMARY, SAMPLES, CONFIRM, RUN = "summary.csv", "samples.csv", "confirm.csv", "run.json"
+CHECKS = "checks.json"
+"""What became of the checks of a tracker on trial."""
 LOCK = ".lock"
 # fmt: off
 COLUMNS = (

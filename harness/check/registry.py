@@ -10,6 +10,7 @@ from freepath.catalog import Catalog
 from freepath.check.model import Check
 from freepath.check.suite import (
     channels,
+    counted,
     empty_full,
     geometry,
     identity,
@@ -35,6 +36,7 @@ SUITE = (
     long_runs,
     scattering,
     channels,
+    counted,
 )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from argparse import Namespace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -22,6 +23,18 @@ def cases_of(options: Namespace) -> tuple[Config, Catalog, list[Case]]:
     loaded = config.load(path, known.parameter_models(), options.axis)
     cases = plan.select(plan.expand(loaded, known), options.include, options.exclude)
     return loaded, known, cases
+
+
+def volume_of(file: Path, sigma_t: float, grid: str | None = None) -> dict[str, Any]:
+    """A volume of the command line as a config names it; raises VolumeError where it is none."""
+    from freepath.errors import VolumeError
+    from freepath.scene.volumes import read_volume
+
+    if not file.is_file():
+        raise VolumeError(f"{file}: expected a volume, got no file")
+    read_volume(file, grid)
+    named = {} if grid is None else {"grid": grid}
+    return {"file": str(file.resolve()), "sigma_t": sigma_t, **named}
 
 
 def print_records(records: list[dict[str, Any]], *, as_json: bool) -> int:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from freepath.errors import FreepathError
-from freepath.results import CONFIRM, CONFIRM_COLUMNS, RUN, SUMMARY, read_rows
+from freepath.results import CHECKS, CONFIRM, CONFIRM_COLUMNS, RUN, SUMMARY, read_rows
 from freepath.table import Row, number, tracker_label
 
 DEEPEST, HIGHEST = 1e-4, 10.0
@@ -54,7 +54,7 @@ def load(results: Sequence[Path]) -> Report:
             records[row["case_id"], row["device"], row["platform"]] = record
             report.rows.append(record)
         known.append((path, records))
-        report.runs.append({"name": name} | _facts(path))
+        report.runs.append({"name": name, "checks": _checks(path)} | _facts(path))
     for question in report.values("q"):
         _span([row for row in report.measured if row["q"] == question])
     for number_, row in enumerate(report.rows):
@@ -90,6 +90,16 @@ def _facts(result: Path) -> dict[str, Any]:
     except (OSError, ValueError):
         return {}
     return facts if isinstance(facts, dict) else {}
+
+
+def _checks(result: Path) -> list[dict[str, Any]]:
+    """What became of the checks of a tracker on trial, where the result is of one."""
+    try:
+        found = json.loads((result / CHECKS).read_text("utf-8"))
+    except (OSError, ValueError):
+        return []
+    known = [one for one in found if isinstance(one, dict)] if isinstance(found, list) else []
+    return [one for one in known if {"name", "status", "text"} <= one.keys()]
 
 
 def _device(row: Row) -> tuple[str, str, str]:

@@ -6,6 +6,7 @@ import contextlib
 import html
 import json
 import os
+from collections import Counter
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -39,6 +40,7 @@ def page(report: Report) -> str:
     parts = {
         "@TITLE@": html.escape(title),
         "@STYLE@": _asset("page.css"),
+        "@CHECKS@": "".join(_checks(run) for run in report.runs if run["checks"]),
         "@ENVIRONMENT@": "".join(map(_environment, report.runs)),
         "@VERSION@": html.escape(__version__),
         "@DATA@": _embedded(data),
@@ -75,6 +77,24 @@ def _embedded(data: Any) -> str:
 def _environment(run: dict[str, Any]) -> str:
     items = (f"<dt>{html.escape(k)}</dt><dd>{html.escape(v)}</dd>" for k, v in environment(run))
     return f"<dl>{''.join(items)}</dl>"
+
+
+def _checks(run: dict[str, Any]) -> str:
+    """What became of the checks of a tracker on trial: how many passed, and each by name."""
+    checks = run["checks"]
+    count = Counter(str(one["status"]) for one in checks)
+    wrong = [one for one in checks if one["status"] not in ("Passed", "Skipped")]
+    told = f"{count['Passed']} checks passed, {len(wrong)} failed, {count['Skipped']} do not apply"
+    rows = "".join(
+        "<dt>{}</dt><dd>{}</dd>".format(
+            *(html.escape(str(text)) for text in (one["name"], one["text"] or one["status"]))
+        )
+        for one in wrong + [one for one in checks if one not in wrong]
+    )
+    return (
+        f"<section><h2>Is it right?</h2><p>{told}.</p>"
+        f"<details><summary>Checks</summary><dl>{rows}</dl></details></section>"
+    )
 
 
 def _asset(name: str) -> str:

@@ -1,0 +1,160 @@
+"""`freepath recommend`: which tracker and majorant are soonest in a volume of one's own."""
+
+from __future__ import annotations
+
+import argparse
+import re
+import time
+from argparse import Namespace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import shtab
+from freepath.arguments import add_device, add_trackers, positive
+
+if TYPE_CHECKING:
+    from freepath.recommend import Finding
+
+
+def add(commands: Any) -> None:
+    """Declare its arguments."""
+    recommend = commands.add_parser(
+        "recommend",
+        help="find the tracker and majorant that are soonest in a volume",
+        description="Measure trackers, majorants and tightness in a volume, ever fewer of them "
+        "ever longer, and say which is the first to reach an accuracy, how sure that is, and "
+        "what comes next. Writes a config that measures them again.",
+        allow_abbrev=False,
+    )
+    recommend.add_argument(
+        "volume", type=Path, metavar="VOLUME", help="a .vdb, .exr, .tif or .npy file"
+    ).complete = shtab.FILE
+    recommend.add_argument(
+        "--accuracy",
+        type=_accuracy,
+        default=0.01,
+        metavar="A",
+        help="relative RMSE to be reached, e.g. 1%% or 0.01 (default: 1%%)",
+    )
+    recommend.add_argument(
+        "--estimand", choices=("transmittance", "free_path"), default="transmittance"
+    )
+    recommend.add_argument(
+        "--sigma-t",
+        type=positive,
+        default=1.0,
+        metavar="X",
+        help="extinction where the volume's density is 1 (default: 1)",
+    )
+    recommend.add_argument("--grid", metavar="NAME", help="which grid of an OpenVDB file")
+    recommend.add_argument(
+        "--budget",
+        type=positive,
+        default=30.0,
+        metavar="SECONDS",
+        help="of measuring, in all; compilation comes on top (default: 30)",
+    )
+    recommend.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        metavar="DIR",
+        help="folder for results and config (default: results/recommend-NAME-TIME)",
+    ).complete = shtab.DIRECTORY
+    recommend.add_argument(
+        "-R",
+        "--include",
+        type=_expression,
+        default="",
+        metavar="RE",
+        help="only trackers whose name matches",
+    )
+    add_device(recommend, "part of the name, platform or driver of the device")
+    add_trackers(recommend)
+
+
+def _accuracy(text: str) -> float:
+    percent = text.strip().endswith("%")
+    try:
+        value = float(text.strip().removesuffix("%")) / (100 if percent else 1)
+    except ValueError:
+        value = 0.0
+    if not 1e-6 <= value < 1.0:
+        raise argparse.ArgumentTypeError(
+            f"expected a relative error such as 1% or 0.01, from 1e-6 to below 1, got '{text}'"
+        )
+    return value
+
+
+def _expression(text: str) -> str:
+    try:
+        re.compile(text)
+    except (re.error, RecursionError, OverflowError) as error:
+        raise argparse.ArgumentTypeError(f"expected a regular expression: {error}") from error
+    return text
+
+
+def execute(options: Namespace) -> int:
+    """Run it; returns the exit code."""
+    from freepath import catalog, recommend, session
+    from freepath.commands.common import console_of, volume_of
+    from freepath.commands.run import _shown_progress
+    from freepath.device import open_devices
+    from freepath.errors import UsageError
+
+    clock = session.Clock(time.perf_counter())
+    medium = {"volume": volume_of(options.volume, options.sigma_t, options.grid)}
+    known = catalog.load(options.trackers)
+    folder = options.output or session.new_folder(f"recommend-{options.volume.stem}")
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise UsageError(f"{folder}: expected a folder that is empty or not there yet")
+    device = open_devices(options.device)[0]
+    console = console_of()
+    told = {"highlight": False, "markup": False, "soft_wrap": True}
+    with _shown_progress(console) as (_, on_progress):
+        search = recommend.Search(
+            known,
+            device,
+            folder,
+            medium,
+            options.estimand,
+            options.accuracy,
+            options.budget,
+            (lambda row: None, on_progress),
+            clock,
+            options.include,
+        )
+        finalists = search.run()
+    console.print(
+        f"{options.volume.name}, {options.estimand} to {100 * options.accuracy:g} %, on "
+        f"{device.info.label}",
+        **told,
+    )
+    for line in told_of(finalists):
+        console.print(line, **told)
+    console.print(
+        f"{search.measured} cases measured in {clock.outside_s:.0f} s, and {clock.build_s:.0f} s "
+        f"of compilation\nwrote {search.write(finalists)}",
+        **told,
+    )
+    return 0
+
+
+def told_of(finalists: list[Finding]) -> list[str]:
+    """The best, how sure that is, and what the others take."""
+    from freepath.recommend import surely
+    from freepath.table import seconds
+
+    best, *others = finalists
+    low, high = (best.time_s * max(0.0, 1 + sign * best.noise) for sign in (-1, 1))
+    lines = [
+        f"soonest: {best.name}",
+        f"  {seconds(best.time_s)} of device time a ray (95 %: {seconds(low)} to {seconds(high)})",
+    ]
+    for place, one in enumerate(others):
+        what = "runner-up" if place == 0 else "then"
+        lines.append(
+            f"{what}: {one.name}\n  {seconds(one.time_s)}, {one.time_s / best.time_s:.2f} times as "
+            f"long; that it is later is {100 * surely(best, one):.0f} % sure"
+        )
+    return lines

@@ -1,0 +1,84 @@
+"""`freepath recommend`: the soonest case of a volume, and what cannot be asked."""
+
+import re
+
+import numpy as np
+import pytest
+from freepath import recommend
+from freepath.cli import main
+from freepath.recommend import Finding, majorants_of, middle_of, surely
+
+
+@pytest.fixture
+def cloud(work):
+    """Thin at the borders, empty in a half."""
+    z, y, x = np.meshgrid(*[np.linspace(-1, 1, 16)] * 3, indexing="ij")
+    np.save(work / "cloud.npy", np.exp(-4 * (x**2 + y**2 + z**2)).astype(np.float32) * (x > 0))
+    return "cloud.npy"
+
+
+@pytest.fixture
+def call(work, capsys, selector):
+    def call(*arguments):
+        try:
+            code = main(["recommend", *arguments, "-d", selector])
+        except SystemExit as ended:
+            code = ended.code
+        captured = capsys.readouterr()
+        return code, captured.out + captured.err
+
+    return call
+
+
+def test_named_with_a_config_that_measures_it_again(call, cloud, monkeypatch):
+    few = [{"grid": {"resolution": 4}}, {"grid": {"resolution": 8}}]
+    monkeypatch.setattr(recommend, "majorants_of", lambda shape: few)
+    options = ["--sigma-t", "0.5", "--budget", "1", "-R", "^(delta|ratio)$", "-o", "out"]
+    code, text = call(cloud, "--accuracy", "5%", *options)
+    assert code == 0, text
+    # at the same majorant ratio tracking has the smaller variance, and here by far
+    (best,) = re.findall(r"soonest: (\S+)", text)
+    assert "/ratio/" in best
+    assert re.search(r"of device time a ray \(95 %: .* to .*\)", text)
+    assert re.search(r"runner-up: \S+\n +[\d.]+ .*s, [\d.]+ times as long", text)
+    assert main(["run", "out/recommended.yaml", "-N"]) == 0
+    monkeypatch.undo()
+    again, _ = call(cloud, *options)
+    assert again == 2  # the folder is taken
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "told"),
+    [
+        (["none.npy"], 2, "none.npy: expected a volume, got no file"),
+        (["cloud.npy", "--accuracy", "much"], 2, "expected a relative error such as 1%"),
+        (["cloud.npy", "--accuracy", "0"], 2, "expected a relative error such as 1%"),
+        (["cloud.npy", "--budget", "-1"], 2, "expected a number above 0"),
+        (["cloud.npy", "-R", "("], 2, "expected a regular expression"),
+        (["cloud.npy", "-R", "none"], 5, "no tracker of transmittance matches 'none'"),
+        (["cloud.npy", "--grid", "density"], 2, "only OpenVDB files have named grids"),
+    ],
+)
+def test_what_cannot_be_asked(call, cloud, arguments, code, told):
+    found, text = call(*arguments)
+    assert (found, told in text) == (code, True), text
+
+
+def test_majorants_follow_the_voxels():
+    shapes = [((126, 86, 154), [16, 11, 20]), ((16, 16, 16), [4, 4, 4])]
+    for shape, middle in shapes:
+        found = majorants_of(shape)
+        assert found[0] == "global"
+        assert "octree" in found[-1]
+        assert found[middle_of(found)] == {"grid": {"resolution": middle}}
+    assert middle_of(majorants_of((1, 1, 1))) == 0
+
+
+def test_how_sure():
+    def taking(time, noise):
+        return Finding("x", {}, time, noise)
+
+    assert surely(taking(1, 0.1), taking(1, 0.1)) == pytest.approx(0.5)
+    # 1.96 standard errors apart
+    assert surely(taking(1, 0.1), taking(1.1, 0.0)) == pytest.approx(0.975, abs=1e-3)
+    assert surely(taking(1, 0.0), taking(1, 0.0)) == 1
