@@ -46,7 +46,7 @@ def made_by(tmp_path_factory):
 def test_samples_are_the_same_on_each(made_by, name, tracker):
     """Nothing is built wrong, read or written where it must not be, or computed otherwise."""
     flights, others = made_by(name)["flights"], made_by("pocl-wheel")["flights"]
-    (case,) = [axes for axes in map(name_of, chosen_cases()) if axes.split("-")[0] == tracker]
+    (case,) = [axes for axes in map(name_of, chosen_cases()) if axes.split("/")[0] == tracker]
     mine, other = flights[case], others[case]
     assert not isinstance(other, str), other
     assert not isinstance(mine, str), mine

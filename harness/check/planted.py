@@ -105,7 +105,7 @@ KERNELS = (
         "a term of the series that is lost in part",
         "deposit(path, mass * state->term, path->length",
         "deposit(path, mass * state->term * 0.95f, path->length",
-        f"{ID}/p_series_cmf/transmittance/trilinear/global",
+        f"{ID}/p_series_cmf/transmittance/trilinear/grid",
     ),
     Defect(
         "a telescoping term that is not divided by all of its chance",

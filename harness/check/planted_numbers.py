@@ -95,7 +95,7 @@ NUMBERS = (
     ),
     Defect(
         "a mean that stands still in float",
-        "const real excess = mean - tally->mean - rise;",
+        "const real excess = mean - tally->mean[i] - rise;",
         "const real excess = (real)0;",
         f"{HARD}/accumulation/still-mean",
     ),
