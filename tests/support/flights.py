@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from freepath import catalog, device
 from freepath.check.rig import Rig
-from freepath.check.suite.identity import Axes, cases_of, name_of
+from freepath.check.suite.identity import WALKS, Axes, cases_of, name_of
 from freepath.device import Device
 from freepath.errors import FreepathError
 from freepath.source import Source
@@ -43,7 +43,8 @@ def chosen_cases() -> list[Axes]:
 def fly(rig: Rig, axes: Axes) -> dict[str, np.ndarray] | str:
     """The samples of a case, or what is wrong with it."""
     try:
-        samples = rig.flight(rays={"chords": {"count": RAYS}}, **axes).record(SAMPLES)
+        chosen = axes | {"majorant": WALKS.get(axes.get("majorant"), "global")}
+        samples = rig.flight(rays={"chords": {"count": RAYS}}, **chosen).record(SAMPLES)
     except FreepathError as error:
         return f"{type(error).__name__}: {error}"
     return {"score": samples.score, "lookups": samples.lookups}
