@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from freepath import effects, limits, majorants, source
-from freepath.catalog import ANY, Catalog
-from freepath.config.sweep import ALONG_PATHS
+from freepath.catalog import ANY, Catalog, Tracker
 from freepath.device import Device, DeviceInfo, Program, scalar_type
 from freepath.majorants import Majorant
 from freepath.plan import Case
@@ -100,15 +99,25 @@ class Scene:
         control = case.params if controlled else None
         return majorants.build(case.majorant, self.medium, bounds, case.tightness, control)
 
-    def largest_score(self, estimand: str) -> float:
-        """What no score exceeds while weights stay below 1, or below the number of channels."""
-        if estimand == "transmittance":
-            return float(len(self.medium.channels))
-        if estimand in ALONG_PATHS:
+    def largest_score(self, case: Case) -> float:
+        """What no score exceeds while weights stay below 1, or below the number of channels.
+
+        inf where a point light may be as near as one likes.
+        """
+        if case.estimand == "mean_extinction":
+            return float(self.bounds((1, 1, 1))[1].max())
+        if case.estimand == "radiance":
+            return self._brightest(case) * len(self.medium.channels)
+        longest = 1.0 if case.estimand == "transmittance" else float(self.segments[:, 6].max())
+        return longest * len(self.medium.channels)
+
+    def _brightest(self, case: Case) -> float:
+        """What a path collects at most, where it is absorbed and where it leaves."""
+        if any(getattr(case.light, "intensity", ())):
             return math.inf
-        if estimand == "free_path":
-            return float(self.segments[:, 6].max()) * len(self.medium.channels)
-        return float(self.bounds((1, 1, 1))[1].max())
+        sky = self.sky(case)
+        around = float(sky.table.max()) if sky else max(getattr(case.light, "radiance", (0.0,)))
+        return around + max(case.medium.emission)
 
 
 def structure_of(
@@ -122,8 +131,7 @@ def structure_of(
 ) -> Structure:
     """Decide what the source of a case consists of."""
     tracker = catalog.trackers[case.tracker]
-    parameters = [(name, p) for name, p in tracker.parameters.items() if not p.host]
-    choices = [(name, p.choices) for name, p in parameters if p.choices is not None]
+    numbers, choices = _declared(tracker, case.params)
     majorant = case.majorant.kind if case.majorant else None
     chromatic = tracker.channels == ANY
     paths = None
@@ -135,15 +143,16 @@ def structure_of(
             chromatic=chromatic,
             near_light="light" in tracker.needs,
         )
-    needs = tracker.needs | (paths.shadow.needs if paths and paths.shadow else frozenset())
+    shadow = paths.shadow if paths else None
+    needs = tracker.needs | (shadow.needs if shadow else frozenset())
     return Structure(
         tracker=tracker.name,
         tracker_code=tracker.code,
         needs=needs,
-        tracker_numbers=tuple(name for name, p in parameters if p.choices is None),
+        tracker_numbers=numbers,
         tracker_state=tuple(tracker.state.items()),
-        tracker_uses=tracker.uses,
-        choices=tuple((n, str(case.params[n]), tuple(map(str, given))) for n, given in choices),
+        tracker_uses=(*tracker.uses, *(shadow.uses if shadow else ())),
+        choices=choices,
         estimand=case.estimand,
         medium=medium.kernel,
         medium_numbers=tuple(medium.numbers),
@@ -160,21 +169,25 @@ def structure_of(
     )
 
 
+def _declared(
+    tracker: Tracker, given: Mapping[str, Any]
+) -> tuple[tuple[str, ...], tuple[source.Chosen, ...]]:
+    """The parameters that a kernel reads as numbers, and those that are defines."""
+    read = {name: p for name, p in tracker.parameters.items() if not p.host}
+    numbers = tuple(name for name, p in read.items() if p.choices is None)
+    chosen = {name: p.choices for name, p in read.items() if p.choices is not None}
+    return numbers, tuple((n, str(given[n]), tuple(map(str, c))) for n, c in chosen.items())
+
+
 def _shadow(case: Case, catalog: Catalog) -> effects.Shadow | None:
     """The tracker of the shadow rays of a case."""
     if case.shadow is None:
         return None
     tracker = catalog.trackers[case.shadow.kind]
-    given = case.shadow.parameters()
-    parameters = [(name, p) for name, p in tracker.parameters.items() if not p.host]
-    return effects.Shadow(
-        tracker.name,
-        tracker.code,
-        tracker.needs,
-        tuple(name for name, p in parameters if p.choices is None),
-        tuple((n, str(given[n]), tuple(map(str, p.choices))) for n, p in parameters if p.choices),
-        tuple(tracker.state.items()),
-    )
+    numbers, choices = _declared(tracker, case.shadow.parameters())
+    state = tuple(tracker.state.items())
+    declared = numbers, choices, state, tracker.uses
+    return effects.Shadow(tracker.name, tracker.code, tracker.needs, *declared)
 
 
 def runner_of(

@@ -14,6 +14,8 @@ from freepath.kernel_files import KernelFile
 MOST_SCATTERINGS = (1 << 24) - 1
 """What `unlimited` is in a kernel, which counts in float; far above any path's steps."""
 ALL_CHANNELS = 3
+Chosen = tuple[str, str, tuple[str, ...]]
+"""(parameter, what was chosen, all that can be chosen), each a define of a tracker."""
 SKY_ROWS, SKY_COLUMNS = 64, 128
 """Of the table that an image of the environment is resampled to, without the rows beyond poles."""
 
@@ -26,8 +28,9 @@ class Shadow:
     code: str
     needs: frozenset[str]
     numbers: tuple[str, ...]
-    choices: tuple[tuple[str, str, tuple[str, ...]], ...]
+    choices: tuple[Chosen, ...]
     state: tuple[tuple[str, str], ...]
+    uses: tuple[str, ...]
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from freepath import kernel_files
-from freepath.effects import SKY_COLUMNS, SKY_ROWS, Effects
+from freepath.effects import SKY_COLUMNS, SKY_ROWS, Chosen, Effects
 from freepath.errors import CatalogError
 from freepath.kernel_files import KernelFile
 
@@ -29,8 +29,7 @@ class Structure:
     tracker_code: str
     needs: frozenset[str]
     tracker_numbers: tuple[str, ...]
-    choices: tuple[tuple[str, str, tuple[str, ...]], ...]
-    """(parameter, what was chosen, all that can be chosen), each a define of the tracker."""
+    choices: tuple[Chosen, ...]
     estimand: str
     medium: str
     medium_numbers: tuple[str, ...]

@@ -168,7 +168,7 @@ class Sweep:
         found = job.bench.measurement
         tracker = self.catalog.trackers[job.case.tracker]
         values = scene.reference(job.case)
-        largest = scene.largest_score(job.case.estimand)
+        largest = scene.largest_score(job.case)
         row = measured_row(job.row, tracker, found, values, largest)
         if self.render:
             wrong = write_pictures(self.folder.folder, row, job.case.rays, found.moments)

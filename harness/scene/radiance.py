@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 from freepath.scene.medium import Array, Medium
-from freepath.scene.references import free_path, transmittance
+from freepath.scene.references import reference
 from freepath.scene.scaled import Scaled
 from freepath.scene.sky import Sky
 
@@ -46,9 +46,10 @@ def _of_channel(
     radiance = _value(getattr(case.light, "radiance", (0.0,)), channel)
     intensity = _value(getattr(case.light, "intensity", (0.0,)), channel)
     if case.estimand == "path_length":
-        return free_path(medium, segments) if albedo == 0 or case.scatterings == 0 else None
+        ends_at_once = albedo == 0 or case.scatterings == 0
+        return reference("free_path", medium, segments) if ends_at_once else None
     if albedo == 0 or case.scatterings == 0:
-        through = transmittance(medium, segments)
+        through = reference("transmittance", medium, segments)
         seen = radiance if outside is None else outside[:, channel]
         return (1 - albedo) * emission * (1 - through) + seen * through
     same = outside is None

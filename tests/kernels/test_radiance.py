@@ -1,6 +1,7 @@
 """Paths that scatter: what does not change a sample. The checks of the group scattering do more."""
 
 import numpy as np
+from freepath.check.identities import check_mean
 
 GRID = {"cloud": {"resolution": 16, "interpolation": "trilinear"}}
 POINT = {"point": {"position": [0.3, 0.4, 2.0], "intensity": 10}}
@@ -31,3 +32,11 @@ def test_a_sample_is_the_same_in_any_number_of_lanes(rig):
     ]
     same = np.isclose(*scores, rtol=1e-3, atol=1e-6)
     assert same.mean() > 0.999
+
+
+def test_a_tracker_of_shadow_rays_brings_the_mathematics_that_it_uses(rig):
+    """Unbiased marching needs a file of kernels/math that no other tracker of the source does."""
+    medium = {"homogeneous": {"sigma_t": 2.0, "albedo": 0.5}}
+    flight = radiance(rig, medium, light=POINT, scatterings=1, shadow="unbiased_march")
+    assert "symmetric_means" in flight.runner.program.source.text
+    check_mean(flight.run(4096).moments, flight.reference(), 1e-4)
