@@ -92,6 +92,17 @@ class Search:
         found = self._round(3, [one.axes for one in _few(found, FINALISTS)])
         return sorted(found, key=lambda one: one.time_s)
 
+    def every(self) -> list[Axes]:
+        """The cases that the search is over: what a full sweep measures."""
+        shape, side = self._voxels()
+        majorants = majorants_of(shape)
+        return [
+            {"tracker": tracker, "majorant": majorant, "tightness": tightness}
+            for tracker in self._trackers(side)
+            for majorant in majorants
+            for tightness in TIGHTNESS
+        ]
+
     def _voxels(self) -> tuple[tuple[int, ...], float]:
         """Counts along x, y, z, and the shortest side in the world."""
         keys = self.medium["volume"]

@@ -1,0 +1,99 @@
+"""Does `freepath recommend` find what a full sweep finds? Runs both.
+
+`python tests/support/full_sweep.py VOLUME SIGMA_T -o DIR [--budget S] [--seconds S]` searches with
+the budget, then measures every case of the search for so many seconds each, and prints what was
+recommended, the soonest cases of the sweep, and how the recommended one stands among these.
+"""
+
+import argparse
+import math
+import time
+from pathlib import Path
+
+from freepath import catalog, plan, recommend, session
+from freepath import config as configs
+from freepath.commands.common import volume_of
+from freepath.commands.recommend import told_of
+from freepath.device import open_devices
+from freepath.results import ResultFolder
+from freepath.table import number, seconds
+
+
+def search_of(options: argparse.Namespace) -> recommend.Search:
+    """The search that `freepath recommend` makes."""
+    return recommend.Search(
+        catalog.load(),
+        open_devices([options.device] if options.device else [])[0],
+        options.output,
+        {"volume": volume_of(options.volume, options.sigma_t)},
+        options.estimand,
+        options.accuracy,
+        options.budget,
+        (lambda row: None, lambda *told: None),
+        session.Clock(time.perf_counter()),
+    )
+
+
+def full_sweep(search: recommend.Search, at_most_s: float) -> dict[str, tuple[float, float]]:
+    """Device seconds a ray to the accuracy and its noise, by the case's name."""
+    stop = recommend.PRECISION[-1] | {"at_most": f"{at_most_s:g} s"}
+    path = search.folder / "full.yaml"
+    path.write_text(search.config_text(search.every(), stop), "utf-8")
+    loaded = configs.load(path, search.known.parameter_models())
+    cases = plan.expand(loaded, search.known)
+    results = ResultFolder(search.folder / "full")
+    session.Run(loaded, search.known, cases, results, search.clock, *search.told).execute(
+        [search.device]
+    )
+    return {row["case"]: needed(row, search.accuracy) for row in results.rows()}
+
+
+def needed(row: dict[str, str], accuracy: float) -> tuple[float, float]:
+    """RMSE(t)^2 = bias^2 + variance x time_per_sample / t, solved for t; infinite by bias."""
+    variance, scale = number(row, "variance"), number(row, "reference")
+    time_s = number(row, "time_per_sample_s")
+    if variance is None or not scale or not time_s:
+        return math.inf, 0.0
+    room = (accuracy * scale) ** 2 - (number(row, "bias_rms") or 0.0) ** 2
+    noise = math.hypot(number(row, "time_noise") or 0.0, number(row, "variance_noise") or 0.0)
+    return (time_s * max(1.0, variance / room) if room > 0 else math.inf), noise
+
+
+def arguments() -> argparse.Namespace:
+    """What was typed."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("volume", type=Path)
+    parser.add_argument("sigma_t", type=float)
+    parser.add_argument("--estimand", default="transmittance")
+    parser.add_argument("--accuracy", type=float, default=0.01)
+    parser.add_argument("--budget", type=float, default=20.0)
+    parser.add_argument("--seconds", type=float, default=1.0)
+    parser.add_argument("-d", "--device")
+    parser.add_argument("-o", "--output", type=Path, required=True)
+    return parser.parse_args()
+
+
+def main() -> None:
+    """Run both and print."""
+    options = arguments()
+    search = search_of(options)
+    finalists = search.run()
+    first = (search.clock.outside_s, search.clock.build_s)
+    print(f"{options.volume.name}, {options.estimand}, {search.device.info.label}")
+    print("\n".join(told_of(finalists)))
+    times = full_sweep(search, options.seconds)
+    outside, build = search.clock.outside_s - first[0], search.clock.build_s - first[1]
+    print(f"\nfull sweep of {len(times)} cases, the soonest:")
+    for name, (time_s, noise) in sorted(times.items(), key=lambda one: one[1][0])[:5]:
+        print(f"  {name}  {seconds(time_s)} +- {100 * noise:.1f} %")
+    ratio = times[finalists[0].name][0] / min(time_s for time_s, _ in times.values())
+    print(f"recommended / soonest of the sweep: {ratio:.3f}")
+    print(
+        f"took {first[0]:.0f} s and {first[1]:.0f} s of compilation; the sweep {outside:.0f} s and "
+        f"{build:.0f} s: {first[0] / outside:.3f} of its time, with compilation "
+        f"{sum(first) / (outside + build):.3f}"
+    )
+
+
+if __name__ == "__main__":
+    main()
