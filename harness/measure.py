@@ -25,7 +25,7 @@ ENOUGH_S = 0.01
 MOST_SAMPLES = 1 << 30
 """No round holds more, and calibration ends there, whatever time a driver says that it takes."""
 LEAST_ROUNDS = 10
-"""Rounds that a budget, or a number of samples, is divided into at least."""
+"""Rounds that a budget is divided into at least."""
 UNITS_PER_LANE = 32
 """Units a round should hold for each lane of the device, so that its end leaves few lanes idle."""
 
@@ -145,7 +145,9 @@ class Bench:
         seconds = min(ROUND_S, self.rule.at_most_s / LEAST_ROUNDS)
         wanted = min(int(seconds / one.time_per_sample_s), MOST_SAMPLES) // rays
         if self.rule.samples is not None:
-            wanted = min(wanted, self.rule.samples // LEAST_ROUNDS)
+            # the start of each unit takes time, so reruns are comparable where they are laid out
+            # alike, whatever the machine was doing while this one was calibrated
+            wanted = min(self.rule.samples // self.rule.rounds, MOST_SAMPLES // rays)
         return shape_of(wanted, rays, one.time_per_sample_s, self.timed.lanes_in_all)
 
     def _run_for(self, runner: Runner, seconds: float) -> Round:

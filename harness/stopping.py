@@ -25,6 +25,8 @@ class Rule:
     """Seconds of rounds after which a case stops whatever its precision."""
     samples: int | None = None
     """Exactly this many samples of each ray, instead of the three others."""
+    rounds: int = 10
+    """How many rounds these are divided into, at least."""
 
 
 class Stopping:

@@ -119,7 +119,7 @@ class Sweep:
             for program in programs
         )
         samples = limits.samples_of(stop.samples, self.device.info)
-        rule = Rule(stop.error, stop.time_noise, stop.at_most, samples)
+        rule = Rule(stop.error, stop.time_noise, stop.at_most, samples, stop.rounds)
         bench = Bench(timed, counting, rule)
         bench.prepare()
         self._add_build(job, bench.measurement.time_compile_s)

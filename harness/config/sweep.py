@@ -142,6 +142,8 @@ class Stop(Model):
     """Seconds of measuring for one case."""
     samples: Annotated[int, Number("count", minimum=2)] | None = None
     """Exactly so many samples for each ray, instead of the rules above."""
+    rounds: Annotated[int, Number("count", minimum=2, maximum=10_000)] = 10
+    """How many rounds these samples are taken in, at least; the same layout in every run."""
 
 
 class Config(Model):

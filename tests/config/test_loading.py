@@ -56,6 +56,7 @@ def test_defaults(load_text):
         "time_noise": 0.02,
         "at_most": 10.0,
         "samples": None,
+        "rounds": 10,
     }
     assert (loaded.include, loaded.exclude, loaded.description) == ((), (), None)
     assert str(loaded.path) == "x.yaml"
