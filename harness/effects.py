@@ -43,6 +43,8 @@ class Effects:
     phase: str
     near_light: bool = False
     """Whether the tracker chooses distances with the light in mind."""
+    aims: bool = False
+    """Whether it chooses directions so too."""
     shadow: Shadow | None = None
     values: Mapping[str, Mapping[str, Any]] = field(default_factory=dict, hash=False)
     """{group: {field of the kernel's Numbers: value or list of values}}, in their order."""
@@ -87,6 +89,7 @@ class Effects:
             before.append("effects/direction")
         if "scattering" in self:
             before += ["effects/near_light"] if self.near_light else []
+            before += ["effects/angle_table"] if self.aims and self.phase != "isotropic" else []
             limited = "roulette" if "roulette" in self else "no_roulette"
             before.append(f"effects/{limited}")
         files = [kernel_files.read(name) for name in [*before, "effects/flight_names"]]
@@ -106,7 +109,11 @@ class Effects:
     def _after(self) -> list[str]:
         order = ("length", "emission", "environment", "environment_image")
         order += ("point_light", "scattering")
-        return [f"effects/{name}" for name in order if name in self]
+        files = [f"effects/{name}" for name in order if name in self]
+        if "scattering" in self:
+            direction = "aimed_direction" if self.aims else "new_direction"
+            files[-1:-1] = ["effects/around", f"effects/{direction}"]
+        return files
 
     def _hooks(self) -> str:
         """What happens at the beginning of a path and at the end of a flight."""
@@ -150,7 +157,7 @@ class Effects:
 
 
 def of_scene(
-    case: Any, medium: Any, shadow: Shadow | None, *, chromatic: bool, near_light: bool
+    case: Any, medium: Any, shadow: Shadow | None, *, chromatic: bool, near_light: bool, aims: bool
 ) -> Effects:
     """Derive the effects of a case in its medium.
 
@@ -171,6 +178,7 @@ def of_scene(
         chromatic=chromatic or channels > 1,
         phase=phase,
         near_light=near_light,
+        aims=aims,
         shadow=shadow if "point_light" in names else None,
         values=_values(case, medium, names, channels),
     )
