@@ -93,6 +93,36 @@ PATHS = (
         "(SCALAR)1 / (pass.angle *",
         f"{SCATTERING}/light/outside/equiangular",
     ),
+    Defect(
+        "a tabulated phase function whose density is left out",
+        "equiangular_density(pass, reach) * relative",
+        "equiangular_density(pass, reach)",
+        f"{SCATTERING}/light/inside/joint-forward",
+    ),
+    Defect(
+        "a table of angles that is searched from its second cell",
+        "for (int cell = 0; cell < cells; ++cell) {",
+        "for (int cell = 1; cell < cells; ++cell) {",
+        f"{SCATTERING}/light/inside/joint-forward",
+    ),
+    Defect(
+        "a direction to the light without the sine of its solid angle",
+        "/ divisor *",
+        "*",
+        f"{SCATTERING}/double/inside/joint-isotropic",
+    ),
+    Defect(
+        "a vertex that is one of two, weighted as if it were the last",
+        "((SCALAR)1 - share) * by_angle + share * by_distance",
+        "by_angle",
+        f"{SCATTERING}/double/inside/joint-isotropic",
+    ),
+    Defect(
+        "an inverse distance that is not divided by its integral",
+        "(SCALAR)1 / (larger(whole, least) *",
+        "(SCALAR)1 / (",
+        f"{SCATTERING}/double/outside/joint-isotropic",
+    ),
     # channels
     Defect(
         "a spectral weight without the majorant's share",

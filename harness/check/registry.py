@@ -17,6 +17,7 @@ from freepath.check.suite import (
     long_runs,
     majorants,
     moments,
+    near_light,
     random_numbers,
     scattering,
     smoke,
@@ -28,6 +29,7 @@ SUITE = (
     smoke,
     identity,
     moments,
+    near_light,
     random_numbers,
     empty_full,
     thickness,
@@ -35,6 +37,7 @@ SUITE = (
     geometry,
     long_runs,
     scattering,
+    near_light,
     channels,
     counted,
 )
