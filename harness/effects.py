@@ -115,6 +115,14 @@ class Effects:
             files[-1:-1] = ["effects/around", f"effects/{direction}"]
         return files
 
+    @property
+    def _going_on(self) -> str:
+        """The lanes that scatter: behind the last light of a point there must be something else."""
+        if any(name in self for name in ("length", "emission", "environment", "environment_image")):
+            return "here"
+        most = "(index)(INTEGER)scene->optics.scatterings"
+        return f"here & less(path->state.scatterings + 1, {most})"
+
     def _hooks(self) -> str:
         """What happens at the beginning of a path and at the end of a flight."""
         at_end = ["collect_length(path, ended);"] if "length" in self else []
@@ -130,7 +138,7 @@ class Effects:
         calls = {
             "emission": "emit(path, scene, here);",
             "point_light": "light_directly(path, scene, rng, here);",
-            "scattering": "scatter(path, scene, rng, here);",
+            "scattering": f"scatter(path, scene, rng, {self._going_on});",
         }
         at_end += [call for name, call in calls.items() if name in self]
         scatters = "scattering" in self

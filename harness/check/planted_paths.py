@@ -61,7 +61,7 @@ PATHS = (
         "a ray that its next path does not start on",
         "    restore_ray(path, ended);",
         "",
-        SINGLE,
+        f"{SCATTERING}/rod/albedo-0.3-tau-2.0/delta",
     ),
     Defect(
         "an environment that is seen from every collision",
@@ -71,8 +71,8 @@ PATHS = (
     ),
     Defect(
         "a new direction that is not of unit length",
-        "ahead.x * cosine + along *",
-        "ahead.x + along *",
+        "axis.x * cosine + along *",
+        "axis.x + along *",
         f"{SCATTERING}/length/tau-3.0-g-0.7/delta",
     ),
     Defect(
@@ -115,7 +115,7 @@ PATHS = (
         "a vertex that is one of two, weighted as if it were the last",
         "((SCALAR)1 - share) * by_angle + share * by_distance",
         "by_angle",
-        f"{SCATTERING}/double/inside/joint-isotropic",
+        f"{SCATTERING}/double/inside/joint-share",
     ),
     Defect(
         "an inverse distance that is not divided by its integral",
