@@ -113,8 +113,8 @@ PATHS = (
     ),
     Defect(
         "a vertex that is one of two, weighted as if it were the last",
-        "((SCALAR)1 - share) * by_angle + share * by_distance",
-        "by_angle",
+        "((SCALAR)1 - share) * path->state.density + share * by_distance",
+        "path->state.density",
         f"{SCATTERING}/double/inside/joint-share",
     ),
     Defect(

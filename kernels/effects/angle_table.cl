@@ -31,21 +31,27 @@ static real tabulated_angle(const Scene *scene, const Pass pass, const real u, c
     for (int cell = 1; cell <= cells; ++cell)
         sum += (cell < cells ? (SCALAR)1 : (SCALAR)0.5) * phase_of_next(&at, scene);
     at = start;
-    real left = u * sum, first = least, density = (real)0;
+    real left = u * sum, first = least, low = least, high = least, below = (real)0, rest = (real)0;
     mask looking = (mask)-1;
     for (int cell = 0; cell < cells; ++cell) {
         const real last = phase_of_next(&at, scene), area = (SCALAR)0.5 * (first + last);
-        const real given = *place * cells - (SCALAR)cell, inside = clamp(left, (real)0, area);
-        const real square = first * first + (SCALAR)2 * (last - first) * inside, none = (real)0;
-        const real found = (SCALAR)2 * inside / (first + sqrt(larger(square, none)));
-        const real part = saturate(choose(known, given, found));
+        const real given = *place * cells - (SCALAR)cell;
         const mask within = choose(known, less(given, (real)1), less(left, area));
         const mask here = looking & (cell == cells - 1 ? (mask)-1 : within);
-        density = choose(here, (first * ((SCALAR)1 - part) + last * part) * cells / sum, density);
-        *place = choose(here & ~known, ((SCALAR)cell + part) / cells, *place);
+        low = choose(here, first, low);
+        high = choose(here, last, high);
+        rest = choose(here, left, rest);
+        below = choose(here, (real)(SCALAR)cell, below);
         left -= area;
         looking &= ~here;
+        if (!any_lane(looking))
+            break;
         first = last;
     }
-    return density;
+    const real inside = clamp(rest, (real)0, (SCALAR)0.5 * (low + high)), none = (real)0;
+    const real square = low * low + (SCALAR)2 * (high - low) * inside;
+    const real found = (SCALAR)2 * inside / (low + sqrt(larger(square, none)));
+    const real part = saturate(choose(known, *place * cells - below, found));
+    *place = choose(known, *place, (below + part) / cells);
+    return (low * ((SCALAR)1 - part) + high * part) * cells / sum;
 }

@@ -23,24 +23,27 @@ citation: >-
 static void begin(Path *path, const Scene *scene, Rng *rng)
 {
     const Pass pass = pass_light_by(path, scene, (SCALAR)1e-5);
-    const Receding receding = receding_from(pass.off, pass.nearest, path->length);
     const mask another = less(path->state.scatterings + 1, (index)(INTEGER)scene->optics.scatterings);
     const real share = choose(another, (real)scene->tracker.share, (real)0);
     const mask first = less(uniform(rng), share);
     const real u = uniform(rng);
-    const real of_first = inverse_distance(receding, u, path->length);
-    real place = place_under_angle(pass, of_first);
-#ifdef ISOTROPIC
-    place = choose(first, place, u);
-    const real relative = (real)1;
-#else
-    const real relative = tabulated_angle(scene, pass, u, first, &place);
+    Receding receding;
+    real of_first = (real)0, place = u, relative = (real)1;
+    if (any_lane(another)) {
+        receding = receding_from(pass.off, pass.nearest, path->length);
+        of_first = inverse_distance(receding, u, path->length);
+        place = choose(first, place_under_angle(pass, of_first), u);
+    }
+#ifndef ISOTROPIC
+    relative = tabulated_angle(scene, pass, u, first, &place);
 #endif
-    const real of_last = equiangular_distance(pass, place, path->length);
-    const real reach = choose(first, of_first, of_last);
-    const real by_angle = equiangular_density(pass, reach) * relative;
-    const real by_distance = inverse_distance_density(receding, pass.off, reach - pass.nearest);
-    path->state.density = ((SCALAR)1 - share) * by_angle + share * by_distance;
+    const real reach = choose(first, of_first, equiangular_distance(pass, place, path->length));
+    path->state.density = equiangular_density(pass, reach) * relative;
+    if (any_lane(another)) {
+        const real by_distance = inverse_distance_density(receding, pass.off, reach - pass.nearest);
+        const real both = ((SCALAR)1 - share) * path->state.density + share * by_distance;
+        path->state.density = choose(another, both, path->state.density);
+    }
     path->state.reach = reach;
     path->state.aim = share;
     walk_begin(path, scene);
