@@ -29,7 +29,6 @@ SUITE = (
     smoke,
     identity,
     moments,
-    near_light,
     random_numbers,
     empty_full,
     thickness,
