@@ -6,6 +6,7 @@ RMSE(t)^2 = bias^2 + variance x time_per_sample / t.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -172,8 +173,9 @@ def tightness_lookups(report: Report) -> alt.Chart:
 
 
 def lights(report: Report) -> alt.Chart:
-    """Variance x time over the lights of a config, in its order; of majorants the best."""
-    order = list(dict.fromkeys(row["light"] for row in report.measured if row["light"]))
+    """Variance x time over lights, by the numbers in their names; of majorants the best."""
+    names = {row["light"] for row in report.measured if row["light"]}
+    order = sorted(names, key=lambda name: list(map(float, re.findall(r"\d+\.?\d*", name))))
     return (
         alt.Chart(alt.NamedData("rows"))
         .transform_filter("datum.light !== null && datum.vt > 0")

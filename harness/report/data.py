@@ -131,7 +131,7 @@ def _record(row: Row, variants: list[tuple[str, str]], device: str) -> dict[str,
     majorant = "none" if none else f"{row['majorant']} x{tightness:g}"
     scene = f"{row['estimand']}, {row['medium']}, {row['rays'] or '?'} rays"
     lit = row["light"] not in ("", "none")
-    bounces = f", {row['scatterings']} scatterings" if lit else ""
+    bounces = f", scatterings: {row['scatterings']}" if lit else ""
     record = {
         "q": f"{scene}, {row['light']}{bounces}" if lit else scene,
         "scene": f"{scene}{bounces}",
