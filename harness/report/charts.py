@@ -179,9 +179,7 @@ def lights(report: Report) -> alt.Chart:
     return (
         alt.Chart(alt.NamedData("rows"))
         .transform_filter("datum.light !== null && datum.vt > 0")
-        .transform_aggregate(
-            best="min(vt)", groupby=["light", "label", "colour", "device", "scene"]
-        )
+        .transform_aggregate(best="min(vt)", groupby=["light", "label", "colour", "device"])
         .mark_line(point=True)
         .encode(
             x=alt.X("light:N").sort(order).axis(title="light", labelLimit=160, labelAngle=-25),
