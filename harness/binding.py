@@ -142,6 +142,7 @@ def structure_of(
             _shadow(case, catalog),
             chromatic=chromatic,
             near_light="light" in tracker.needs,
+            aims=tracker.aims,
         )
     shadow = paths.shadow if paths else None
     needs = tracker.needs | (shadow.needs if shadow else frozenset())

@@ -26,7 +26,7 @@ from pydantic import ValidationInfo, create_model, field_validator
 
 NEEDS = ("majorant", "control", "closed_form", "cells", "light")
 ANY = "any"
-USES = ("math/newton", "math/symmetric_means")
+USES = ("math/inverse_distance", "math/newton", "math/symmetric_means")
 """General mathematics in kernels/ that a tracker may have composed before it."""
 STATE = r"(real|mask|index)(\[[1-9][0-9]?\])?"
 """What a tracker may keep of a path: types that main.cl can merge under a mask, and arrays of them
@@ -127,6 +127,7 @@ class FrontMatter(Model):
     )
     bounding: Annotated[bool | dict[str, tuple[Any, ...]], Bounding()] = False
     escapes: Annotated[bool, Flag()] = True
+    aims: Annotated[bool, Flag()] = False
     single_flight: Annotated[bool | dict[str, tuple[Any, ...]], Bounding()] = False
     unbiased: Annotated[bool, Flag()] = True
     parameters: dict[str, Parameter] = {}
@@ -167,6 +168,8 @@ class Tracker:
     """Whether it is only right where the majorant bounds; or for which choices of a parameter."""
     escapes: bool
     """Whether a flight may leave the medium: one that never does meets no environment."""
+    aims: bool
+    """Whether directions are chosen with the light in mind too, by effects/aimed_direction."""
     single_flight: bool | dict[str, tuple[Any, ...]]
     """Whether, or for which choices, what it scores on its way is for no path that goes on."""
     unbiased: bool
@@ -259,6 +262,7 @@ def read(file: Path) -> Tracker:
         majorants=front.majorants,
         bounding=front.bounding,
         escapes=front.escapes,
+        aims=front.aims,
         single_flight=front.single_flight,
         unbiased=front.unbiased,
         parameters=front.parameters,

@@ -43,6 +43,8 @@ class Effects:
     phase: str
     near_light: bool = False
     """Whether the tracker chooses distances with the light in mind."""
+    aims: bool = False
+    """Whether it chooses directions so too."""
     shadow: Shadow | None = None
     values: Mapping[str, Mapping[str, Any]] = field(default_factory=dict, hash=False)
     """{group: {field of the kernel's Numbers: value or list of values}}, in their order."""
@@ -87,6 +89,7 @@ class Effects:
             before.append("effects/direction")
         if "scattering" in self:
             before += ["effects/near_light"] if self.near_light else []
+            before += ["effects/angle_table"] if self.aims and self.phase != "isotropic" else []
             limited = "roulette" if "roulette" in self else "no_roulette"
             before.append(f"effects/{limited}")
         files = [kernel_files.read(name) for name in [*before, "effects/flight_names"]]
@@ -106,7 +109,19 @@ class Effects:
     def _after(self) -> list[str]:
         order = ("length", "emission", "environment", "environment_image")
         order += ("point_light", "scattering")
-        return [f"effects/{name}" for name in order if name in self]
+        files = [f"effects/{name}" for name in order if name in self]
+        if "scattering" in self:
+            direction = "aimed_direction" if self.aims else "new_direction"
+            files[-1:-1] = ["effects/around", f"effects/{direction}"]
+        return files
+
+    @property
+    def _going_on(self) -> str:
+        """The lanes that scatter: behind the last light of a point there must be something else."""
+        if any(name in self for name in ("length", "emission", "environment", "environment_image")):
+            return "here"
+        most = "(index)(INTEGER)scene->optics.scatterings"
+        return f"here & less(path->state.scatterings + 1, {most})"
 
     def _hooks(self) -> str:
         """What happens at the beginning of a path and at the end of a flight."""
@@ -123,7 +138,7 @@ class Effects:
         calls = {
             "emission": "emit(path, scene, here);",
             "point_light": "light_directly(path, scene, rng, here);",
-            "scattering": "scatter(path, scene, rng, here);",
+            "scattering": f"scatter(path, scene, rng, {self._going_on});",
         }
         at_end += [call for name, call in calls.items() if name in self]
         scatters = "scattering" in self
@@ -150,7 +165,7 @@ class Effects:
 
 
 def of_scene(
-    case: Any, medium: Any, shadow: Shadow | None, *, chromatic: bool, near_light: bool
+    case: Any, medium: Any, shadow: Shadow | None, *, chromatic: bool, near_light: bool, aims: bool
 ) -> Effects:
     """Derive the effects of a case in its medium.
 
@@ -171,6 +186,7 @@ def of_scene(
         chromatic=chromatic or channels > 1,
         phase=phase,
         near_light=near_light,
+        aims=aims,
         shadow=shadow if "point_light" in names else None,
         values=_values(case, medium, names, channels),
     )

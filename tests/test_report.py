@@ -1,6 +1,7 @@
 """Reports: their numbers, their formats, and the page in a real browser."""
 
 import csv
+import itertools
 import json
 import math
 import shutil
@@ -8,7 +9,9 @@ import time
 
 import pytest
 from freepath.cli import main
+from freepath.errors import FreepathError
 from freepath.report import load, write
+from freepath.report.pictures import picture
 from freepath.report.text import markdown
 from freepath.results import COLUMNS, CONFIRM_COLUMNS
 
@@ -113,6 +116,22 @@ def test_every_chart_is_drawn(result, tmp_path, chart):
         assert main(["report", str(result), "--chart", chart, "-o", str(path)]) == 0
         assert path.read_bytes().startswith(start)
     assert "<script" not in (tmp_path / "p.svg").read_text()
+
+
+def test_lights_are_told_apart_and_shown_side_by_side(tmp_path, result):
+    places = ("point-0.5x0.5x2", "point-0.5x0.5x9")
+    rows = [
+        row_of(i, tracker, light=light, scatterings="1")
+        for i, (tracker, light) in enumerate(itertools.product(("delta", "joint"), places))
+    ]
+    lit = result_of(tmp_path / "lit", rows)
+    assert all(light in text for text, light in zip(load([lit]).values("q"), places, strict=True))
+    chart = picture(load([lit]), "lights").to_dict()
+    (panel,) = chart["concat"]
+    assert panel["encoding"]["x"]["sort"] == list(places)
+    assert len(next(iter(chart["datasets"].values()))) == 4
+    with pytest.raises(FreepathError, match="nothing that the chart 'lights'"):
+        picture(load([result]), "lights")
 
 
 def test_markdown_names_the_soonest(result):

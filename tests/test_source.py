@@ -247,7 +247,9 @@ def test_a_source_has_the_effects_that_it_needs_and_no_other():
         assert added == {f"effects/{name}.cl"}
     scattering = set(files_of(radiance(names=("scattering",)))) - set(bare)
     assert scattering == {
+        "effects/around.cl",
         "effects/direction.cl",
+        "effects/new_direction.cl",
         "effects/no_roulette.cl",
         "effects/scattering.cl",
         "math/circle_polynomial.cl",

@@ -61,7 +61,7 @@ PATHS = (
         "a ray that its next path does not start on",
         "    restore_ray(path, ended);",
         "",
-        SINGLE,
+        f"{SCATTERING}/rod/albedo-0.3-tau-2.0/delta",
     ),
     Defect(
         "an environment that is seen from every collision",
@@ -71,8 +71,8 @@ PATHS = (
     ),
     Defect(
         "a new direction that is not of unit length",
-        "ahead.x * cosine + along *",
-        "ahead.x + along *",
+        "axis.x * cosine + along *",
+        "axis.x + along *",
         f"{SCATTERING}/length/tau-3.0-g-0.7/delta",
     ),
     Defect(
@@ -92,6 +92,36 @@ PATHS = (
         "pass.off / (pass.angle *",
         "(SCALAR)1 / (pass.angle *",
         f"{SCATTERING}/light/outside/equiangular",
+    ),
+    Defect(
+        "a tabulated phase function whose density is left out",
+        "equiangular_density(pass, reach) * relative",
+        "equiangular_density(pass, reach)",
+        f"{SCATTERING}/light/inside/joint-forward",
+    ),
+    Defect(
+        "a table of angles that is searched from its second cell",
+        "for (int cell = 0; cell < cells; ++cell) {",
+        "for (int cell = 1; cell < cells; ++cell) {",
+        f"{SCATTERING}/light/inside/joint-forward",
+    ),
+    Defect(
+        "a direction to the light without the sine of its solid angle",
+        "/ divisor *",
+        "*",
+        f"{SCATTERING}/double/inside/joint-isotropic",
+    ),
+    Defect(
+        "a vertex that is one of two, weighted as if it were the last",
+        "((SCALAR)1 - share) * path->state.density + share * by_distance",
+        "path->state.density",
+        f"{SCATTERING}/double/inside/joint-share",
+    ),
+    Defect(
+        "an inverse distance that is not divided by its integral",
+        "(SCALAR)1 / (larger(whole, least) *",
+        "(SCALAR)1 / (",
+        f"{SCATTERING}/double/outside/joint-isotropic",
     ),
     # channels
     Defect(

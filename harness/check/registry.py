@@ -17,6 +17,7 @@ from freepath.check.suite import (
     long_runs,
     majorants,
     moments,
+    near_light,
     random_numbers,
     scattering,
     smoke,
@@ -35,6 +36,7 @@ SUITE = (
     geometry,
     long_runs,
     scattering,
+    near_light,
     channels,
     counted,
 )

@@ -39,7 +39,7 @@ def add(commands: Any) -> None:
         default="cost",
         metavar="NAME",
         help="which chart a picture is of: cost (default), pareto, tightness-time, "
-        "tightness-lookups, lookups, occupancy, devices, confirm",
+        "tightness-lookups, lights, lookups, occupancy, devices, confirm",
     )
 
 

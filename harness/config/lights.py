@@ -51,4 +51,14 @@ class Image(Kind):
     """Makes radiance of its values."""
 
 
-LIGHTS = by_kind(Dark, Uniform, PointLight, PointInEnvironment, Image)
+class PointInImage(PointLight):
+    """A point before an environment from an image."""
+
+    kind: ClassVar[str] = "point_in_image"
+    file: Annotated[str, Text("a file name")]
+    """The image: see `image`."""
+    scale: Factor = 1.0
+    """Makes radiance of its values."""
+
+
+LIGHTS = by_kind(Dark, Uniform, PointLight, PointInEnvironment, Image, PointInImage)

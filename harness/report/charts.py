@@ -6,6 +6,7 @@ RMSE(t)^2 = bias^2 + variance x time_per_sample / t.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -171,6 +172,25 @@ def tightness_lookups(report: Report) -> alt.Chart:
     return _over_tightness(report, "vl", "relative variance x lookups")
 
 
+def lights(report: Report) -> alt.Chart:
+    """Variance x time over lights, by the numbers in their names; of majorants the best."""
+    names = {row["light"] for row in report.measured if row["light"]}
+    order = sorted(names, key=lambda name: list(map(float, re.findall(r"\d+\.?\d*", name))))
+    return (
+        alt.Chart(alt.NamedData("rows"))
+        .transform_filter("datum.light !== null && datum.vt > 0")
+        .transform_aggregate(best="min(vt)", groupby=["light", "label", "colour", "device"])
+        .mark_line(point=True)
+        .encode(
+            x=alt.X("light:N").sort(order).axis(title="light", labelLimit=160, labelAngle=-25),
+            y=_y("best:Q", "relative variance x time [s]"),
+            color=_colour(report),
+            detail=["label:N", "device:N"],
+            tooltip=["label:N", "light:N", alt.Tooltip("best:Q", format=".3~e")],
+        )
+    )
+
+
 def lookups(report: Report) -> alt.Chart:
     """Lookups are not time: one against the other."""
     return (
@@ -255,12 +275,15 @@ CHARTS: dict[str, tuple[Callable[[Report], Any], str]] = {
     "pareto": (pareto, "The best after each time, and which case it is"),
     "tightness-time": (tightness_time, "Variance x time over tightness"),
     "tightness-lookups": (tightness_lookups, "Variance x lookups over tightness"),
+    "lights": (lights, "Variance x time over the lights"),
     "lookups": (lookups, "Lookups are not time"),
     "occupancy": (occupancy, "Lanes at work"),
     "devices": (devices, "Devices at equal accuracy"),
     "confirm": (confirm, "Predicted errors, measured"),
 }
 """Charts by the names that --chart takes, with their titles."""
+ACROSS = frozenset({"lights"})
+"""Charts across the questions of a scene: pictures, for a page shows one question at a time."""
 
 
 def useful(report: Report) -> list[str]:
@@ -269,6 +292,7 @@ def useful(report: Report) -> list[str]:
     shown = dict.fromkeys(CHARTS, bool(rows))
     if len({row["x"] for row in rows if row["x"] is not None}) < 2:
         shown["tightness-time"] = shown["tightness-lookups"] = False
+    shown["lights"] = len({row["light"] for row in rows if row["light"]}) > 1
     shown["devices"] = len({row["device"] for row in rows}) > 1
     shown["confirm"] = bool(report.confirmed)
     shown["lookups"] = any(row["lookups"] for row in rows)

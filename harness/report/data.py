@@ -129,8 +129,13 @@ def _record(row: Row, variants: list[tuple[str, str]], device: str) -> dict[str,
     none = row["majorant"] == "none"
     tightness = None if none else number(row, "tightness")
     majorant = "none" if none else f"{row['majorant']} x{tightness:g}"
+    scene = f"{row['estimand']}, {row['medium']}, {row['rays'] or '?'} rays"
+    lit = row["light"] not in ("", "none")
+    bounces = f", scatterings: {row['scatterings']}" if lit else ""
     record = {
-        "q": f"{row['estimand']}, {row['medium']}, {row['rays'] or '?'} rays",
+        "q": f"{scene}, {row['light']}{bounces}" if lit else scene,
+        "scene": f"{scene}{bounces}",
+        "light": row["light"] if lit else None,
         "device": device,
         "case": row["case"],
         "label": label,

@@ -11,7 +11,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from freepath.report.charts import CHARTS, useful
+from freepath.report.charts import ACROSS, CHARTS, useful
 from freepath.report.data import Report
 from freepath.report.text import environment
 from freepath.version import __version__
@@ -29,6 +29,7 @@ def page(report: Report) -> str:
     shown = {
         name: {"title": CHARTS[name][1], "spec": _specification(report, name)}
         for name in useful(report)
+        if name not in ACROSS
     }
     data = {
         "fields": FIELDS,

@@ -15,7 +15,7 @@ MOST = 80
 def picture(report: Report, name: str, columns: int = 2) -> Any:
     """Return a chart by its name, as an altair chart with its data in it."""
     import altair
-    from freepath.report.charts import CHARTS, useful
+    from freepath.report.charts import ACROSS, CHARTS, useful
 
     if name not in CHARTS:
         hint = did_you_mean(name, CHARTS)
@@ -26,8 +26,10 @@ def picture(report: Report, name: str, columns: int = 2) -> Any:
     make, title = CHARTS[name]
     source = report.confirmed if name == "confirm" else report.measured
     panels = []
-    for question in dict.fromkeys(row["q"] for row in source):
-        rows = soonest([row for row in source if row["q"] == question])
+    panel_of = "scene" if name in ACROSS else "q"
+    for question in dict.fromkeys(row[panel_of] for row in source):
+        rows = [row for row in source if row[panel_of] == question]
+        rows = rows if name in ACROSS else soonest(rows)
         size = {"width": 400} if name in ("occupancy", "devices") else {"width": 400, "height": 300}
         chart = make(report).properties(title=question, **size)
         panels.append(_with_data(chart, altair.InlineData(values=rows)))

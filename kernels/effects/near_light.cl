@@ -11,7 +11,9 @@ typedef struct {
     real angle;               /* between the ray's two ends, seen from the light */
 } Pass;
 
-static Pass pass_light(const Path *path, const Scene *scene)
+/* `near` is a lower bound of how far off, in lengths of the ray, for a light on it: any density that is nowhere 0
+   is right. */
+static Pass pass_light_by(const Path *path, const Scene *scene, const SCALAR near)
 {
     const Vector to_light = in_world(scene, scene->light.x - path->origin_x, scene->light.y - path->origin_y,
                                      scene->light.z - path->origin_z);
@@ -21,14 +23,22 @@ static Pass pass_light(const Path *path, const Scene *scene)
     const real x = to_light.x - pass.nearest * ahead.x;
     const real y = to_light.y - pass.nearest * ahead.y;
     const real z = to_light.z - pass.nearest * ahead.z;
-    /* a lower bound, for a light on the ray: any density that is nowhere 0 is right */
     const real off = sqrt(x * x + y * y + z * z);
-    const real least = (SCALAR)1e-3 * path->length + (SCALAR)1e-20;
+    const real least = near * path->length + (SCALAR)1e-20;
     pass.off = larger(off, least);
     /* not the difference of two angles: far from the light both are nearly a right one */
     const real both = pass.off * pass.off - pass.nearest * (path->length - pass.nearest);
     pass.angle = atan2(path->length * pass.off, both);
     return pass;
+}
+
+static Pass pass_light(const Path *path, const Scene *scene) { return pass_light_by(path, scene, (SCALAR)1e-3); }
+
+/* Which of the angles, in [0, 1], a distance is seen under. */
+static real place_under_angle(const Pass pass, const real t)
+{
+    const real angle = atan2(t * pass.off, pass.off * pass.off - pass.nearest * (t - pass.nearest));
+    return choose(less((real)0, pass.angle), angle / pass.angle, (real)0);
 }
 
 static real equiangular_distance(const Pass pass, const real u, const real length)

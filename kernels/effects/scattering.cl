@@ -45,22 +45,7 @@ static void scatter(Path *path, const Scene *scene, Rng *rng, const mask here)
     on &= ~roulette(path, rng, on);
     if (!any_lane(on))
         return;
-    const Vector ahead = heading(path, scene);
-    const real cosine = sample_cosine(scene, rng);
-    real along, across;
-    point_on_circle(uniform(rng), &along, &across);
-    const real off = (SCALAR)1 - cosine * cosine;
-    const real sine = sqrt(larger(off, (real)0));
-    along *= sine;
-    across *= sine;
-    /* A basis around the direction: Duff et al. 2017, Building an orthonormal basis, revisited. */
-    const real sign = copysign((real)1, ahead.z);
-    const real a = (SCALAR)-1 / (sign + ahead.z), b = ahead.x * ahead.y * a;
-    const Vector turned = {
-        ahead.x * cosine + along * ((SCALAR)1 + sign * ahead.x * ahead.x * a) + across * b,
-        ahead.y * cosine + along * sign * b + across * (sign + ahead.y * ahead.y * a),
-        ahead.z * cosine - along * sign * ahead.x - across * ahead.y,
-    };
+    const Vector turned = new_direction(path, scene, rng, on);
     Path next = *path;
     turn(&next, scene, turned, on);
     flight_begin(&next, scene, rng);

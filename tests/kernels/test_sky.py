@@ -166,3 +166,21 @@ def test_defects_are_found(rig, image, old, new):
 def test_scenes_without_an_image_have_none_of_it(rig):
     text = radiance(rig, homogeneous(albedo=0.5), "uniform").runner.program.source.text
     assert "sky" not in text.lower()
+
+
+@pytest.mark.parametrize("tracker", ["delta", "combined"])
+def test_a_point_before_an_image_brings_what_both_bring(rig, image, tracker):
+    place = {"position": [0.4, 0.6, 1.5], "intensity": 4}
+    light = image(random_image())
+    both = {"point_in_image": light["image"] | place}
+    medium = homogeneous(albedo=0.8, g=0.3)
+    lights = (both, light, {"point": place})
+    together, around, point = (
+        radiance(rig, medium, one, tracker if one is both else "delta", scatterings=2).run(
+            8192, first_sample=10000 * i
+        )
+        for i, one in enumerate(lights)
+    )
+    moments = [one.moments for one in (together, around, point)]
+    joint = Moments(8192, moments[0].mean, sum(one.m2 for one in moments))
+    check_mean(joint, moments[1].mean + moments[2].mean, ALPHA)

@@ -37,6 +37,7 @@ NEAR: dict[str, dict[str, Any]] = {
     "tabulated-product": {"tabulated": {"table": "product", "bins": 8}},
     "combined": {"combined": {"share": 0.3}},
 }
+NEAR_TRACKERS = ("equiangular", "tabulated", "joint")
 SHADOWS = (
     ("delta", "ratio"), ("delta", "next_flight_ratio"), ("analytic", "regular"),
     ("regular", "delta"), ("weighted_delta", "track_length"), ("decomposition", "residual_ratio"),
@@ -78,7 +79,7 @@ def _without_reference() -> Iterator[Check]:
             yield _check(name, "delta", furnace, kind=kind, sigma_t=depth, g=g)
     for kind in ("grid", "stretched"):
         yield _check(f"furnace/{kind}", "regular", furnace, kind=kind, sigma_t=30, g=0.9)
-    for tracker in ("equiangular", "tabulated", "combined"):
+    for tracker in (*NEAR_TRACKERS, "combined"):
         yield _check(f"several/ratio/{tracker}", tracker, several, shadow="ratio")
     for tracker, shadow in TOGETHER:
         yield _check(f"several/{shadow}/{tracker}", tracker, several, shadow=shadow)
@@ -187,14 +188,16 @@ def single(rig: Rig, alpha: float, tracker: str, shadow: str, g: float) -> None:
     check_mean(one.moments, flight.reference(), alpha)
 
 
-def light(rig: Rig, alpha: float, tracker: str, sampler: dict[str, Any], place: str) -> None:
+def light(
+    rig: Rig, alpha: float, tracker: str, sampler: dict[str, Any], place: str, g: float = 0.3
+) -> None:
     """A sampler of light, with the light outside, inside, far away, or close to a ray."""
     position = PLACES[place]
     distance = max(1.0, abs(position[2]))
     lamp = {"point": {"position": position, "intensity": 10 * distance**2}}
     axes = {"light": lamp, "scatterings": 1, "shadow": "ratio"}
     axes["rays"] = {"orthographic": {"resolution": 9}}
-    flight = _fly(rig, sampler, _homogeneous(albedo=0.5, g=0.3), **axes)
+    flight = _fly(rig, sampler, _homogeneous(albedo=0.5, g=g), **axes)
     one, expected = flight.run(8192), flight.reference()
     check_clean(one, bounded=True)
     known = np.isfinite(expected)
@@ -205,7 +208,7 @@ def light(rig: Rig, alpha: float, tracker: str, sampler: dict[str, Any], place: 
 
 def several(rig: Rig, alpha: float, tracker: str, shadow: str) -> None:
     """A cloud that scatters more than once, against delta tracking."""
-    near = tracker in ("equiangular", "tabulated", "combined")
+    near = tracker in (*NEAR_TRACKERS, "combined")
     # weights of a sampler of light multiply: after eight scatterings only their tail counts
     medium = {"cloud": CLOUD | {"sigma_t": 3 if near else 10, "albedo": 0.9, "g": 0.4}}
     axes = {"light": POINT, "scatterings": 2 if near else 8, "majorant": "grid"}

@@ -13,7 +13,7 @@ from freepath.check.suite.common import FEW, everyone, fly, knows_depth
 from freepath.check.verdict import demand
 
 SAMPLES = 4
-SCATTERING = ("delta", "combined", "equiangular", "regular", "spectral", "tabulated")
+SCATTERING = ("delta", "combined", "equiangular", "joint", "regular", "spectral", "tabulated")
 
 
 def checks(catalog: Catalog) -> Iterator[Check]:

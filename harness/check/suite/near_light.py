@@ -1,0 +1,83 @@
+"""Vertices that are drawn together towards a light, once and twice scattered, against float64."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from freepath.catalog import Catalog
+from freepath.check.double_scattering import double_scattering
+from freepath.check.identities import check_clean, check_mean
+from freepath.check.model import Check
+from freepath.check.rig import Flight, Rig
+from freepath.check.suite.scattering import FEW, PHASES, PLACES, light
+from freepath.stats import Moments
+
+ALBEDO, SIGMA_T = 0.5, 2.0
+ONCE = (
+    "The phase function is drawn from a table over the angle, which a light beside the ray, far "
+    "away or behind it narrows to nothing: the mean must stay that of the integral."
+)
+TWICE = (
+    "Two vertices have one density, of three variables whose factors cancel: a factor that is "
+    "lost is no more than another light, but for an integral over all of them."
+)
+
+
+def checks(catalog: Catalog) -> Iterator[Check]:
+    """Of the tracker `joint`, and of delta tracking where its variance is finite."""
+    for place, (phase, g) in itertools.product(PLACES, PHASES.items()):
+        once = {"sampler": {"joint": {}}, "place": place, "g": g}
+        yield _check(f"light/{place}/joint-{phase}", "joint", ONCE, "fast", light, once)
+        twice = {"sampler": {"joint": {}}, "place": place, "g": g}
+        yield _check(f"double/{place}/joint-{phase}", "joint", TWICE, "slow", double, twice)
+    for name, given in {"cells": {"cells": 1}, "share": {"share": 0.9}}.items():
+        few = {"sampler": {"joint": given}, "place": "inside", "g": 0.9}
+        yield _check(f"double/inside/joint-{name}", "joint", TWICE, "slow", double, few)
+    plain = {"sampler": "delta", "place": "outside", "g": 0.0}
+    yield _check("double/outside/delta", "delta", TWICE, "slow", double, plain)
+
+
+def _check(
+    name: str, tracker: str, sentence: str, label: str, situation: Any, options: dict[str, Any]
+) -> Check:
+    def run(rig: Rig, alpha: float) -> None:
+        situation(rig, alpha, tracker=tracker, **options)
+
+    labels = (label, "hard", "scattering", tracker)
+    kernels = f"scattering/{name.split('/', maxsplit=1)[0]}/{tracker}"
+    return Check(f"hard/scattering/{name}", labels, sentence, run, kernels=kernels)
+
+
+def double(rig: Rig, alpha: float, tracker: str, sampler: Any, place: str, g: float) -> None:
+    """Light that scatters once and twice, against both integrals."""
+    position = np.array(PLACES[place])
+    intensity = 10 * max(1.0, abs(position[2])) ** 2
+    twice = _fly(rig, sampler, position, intensity, g, 2)
+    expected = _fly(rig, sampler, position, intensity, g, 1).reference()
+    again, error = double_scattering(SIGMA_T, g, position, twice.segments, seed=rig.seed)
+    factor = ALBEDO**2 * intensity
+    one = twice.run(32768)
+    check_clean(one, bounded=True)
+    # the reference has an error of its own, which counts as one of the mean
+    count = one.moments.count
+    deviations = one.moments.m2 + (error * factor) ** 2 * count * (count - 1)
+    check_mean(Moments(count, one.moments.mean, deviations), expected + again * factor, alpha)
+
+
+def _fly(
+    rig: Rig, sampler: Any, position: Any, intensity: float, g: float, scatterings: int
+) -> Flight:
+    return rig.flight(
+        record=False,
+        estimand="radiance",
+        medium={"homogeneous": {"sigma_t": SIGMA_T, "albedo": ALBEDO, "g": g}},
+        tracker=sampler,
+        light={"point": {"position": position.tolist(), "intensity": float(intensity)}},
+        scatterings=scatterings,
+        shadow="analytic",
+        rays=FEW,
+        lanes=16,
+    )
