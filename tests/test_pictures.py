@@ -152,7 +152,7 @@ def test_a_full_disk_is_told_and_leaves_nothing(tmp_path, full_disk):
 def test_a_png_that_was_cut_off_is_noticed(tmp_path, full_disk):
     values = np.random.default_rng(1).random((128, 128, 3))
     with pytest.raises(FreepathError, match="could not be written to its end"):
-        pictures.write_png(tmp_path / "a", values, {})
+        pictures.write_mean(tmp_path / "a", values, {})
     assert list(tmp_path.iterdir()) == []
 
 

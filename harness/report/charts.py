@@ -13,7 +13,7 @@ import altair as alt
 from freepath.report.data import DEEPEST, HIGHEST, Report
 
 POINTS = 32
-SCIENTIFIC = {"format": "~e", "tickCount": 6}
+SCIENTIFIC = {"format": "~e", "tickCount": 6, "labelSeparation": 8, "labelOverlap": "greedy"}
 TIME, ERROR = "device time a ray [s]", "relative RMSE"
 CASE = [
     alt.Tooltip("method:N", title="case"),
@@ -47,7 +47,8 @@ def _colour(report: Report) -> alt.Color:
     """One colour a tracker, the same in all charts."""
     names = list(dict.fromkeys(row["colour"] for row in report.measured))
     scheme = "tableau10" if len(names) <= 10 else "tableau20"
-    return alt.Color("colour:N").scale(scheme=scheme, domain=names).title("tracker")
+    colour = alt.Color("colour:N").scale(scheme=scheme, domain=names).title("tracker")
+    return colour.legend(symbolOpacity=1)  # else as faint as the points between which curves run
 
 
 def _hover() -> alt.Parameter:

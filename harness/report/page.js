@@ -141,6 +141,51 @@
     if (rowed) spec.height = 22 * Math.max(1, new Set(values.map((row) => row[rowed])).size);
     views[name] = await vegaEmbed(figure.querySelector(".chart"), spec, { actions: false, renderer: "canvas" });
   }
+  function picture(address, text) {
+    const image = new Image();
+    image.src = address;
+    image.alt = text;
+    image.title = text;
+    return image;
+  }
+  function caption(text) {
+    const line = document.createElement("figcaption");
+    line.textContent = text;
+    return line;
+  }
+  function render() {
+    const question = element("question").value, ids = new Set(chosen.map((row) => row.id));
+    const panels = data.renders.filter((one) => one.q === question)
+      .map((one) => ({ ...one, items: one.items.filter((item) => ids.has(item.id)) }))
+      .filter((one) => one.items.length);
+    element("renders").hidden = !panels.length;
+    const body = document.createDocumentFragment();
+    for (const one of panels) {
+      const grid = document.createElement("div"), several = data.renders.some((other) => other.device !== one.device);
+      grid.className = "renders";
+      const reference = { method: "what it should be", picture: one.reference };
+      for (const item of [reference, ...one.items]) {
+        const figure = document.createElement("figure"), title = document.createElement("h3"), pair = document.createElement("div");
+        title.textContent = item.method;
+        pair.className = "pair";
+        pair.append(picture(item.picture, item.method));
+        figure.append(title, pair);
+        if (item.error) {
+          pair.append(picture(item.error, `error of ${item.method}`));
+          figure.append(caption(`${item.samples} samples, ${seconds(item.time)} a pixel; relative RMSE ${percent(item.rmse)}`));
+        } else {
+          const scale = document.createElement("div");
+          scale.className = "scale";
+          figure.append(caption(`The mean of all unbiased cases${several ? `, ${one.device}` : ""}. Errors: 0 to ${percent(one.brightest)} of its mean`), scale);
+        }
+        grid.append(figure);
+      }
+      body.append(grid);
+    }
+    element("renders-hint").textContent = "Each case had the same device time; beside each picture its error, " +
+      "the brighter the larger. The exposure and the scale of errors are the same for all.";
+    element("renders-body").replaceChildren(body);
+  }
   const visible = new Set(), stale = new Set();
   let drawing = Promise.resolve();
   function refresh(name) {
@@ -153,6 +198,7 @@
     const count = chosen.filter((row) => row.q === question).length;
     element("count").textContent = `${count} cases of this question, ${chosen.length} in all`;
     for (const name of Object.keys(data.charts)) { stale.add(name); refresh(name); }
+    render();
   }
   window.freepathReady = () => drawing;
 
