@@ -133,7 +133,10 @@ def pareto(report: Report) -> alt.LayerChart:
         .transform_filter("datum.t <= datum.first")
         .encode(x=_x("time:Q", TIME), y=_error_axis())
     )
-    lines = base.mark_line(color="#888", strokeWidth=1.5).encode(strokeDash="device:N")
+    dash = alt.StrokeDash("device:N")
+    if len(report.values("device")) < 2:
+        dash = dash.legend(None)
+    lines = base.mark_line(color="#888", strokeWidth=1.5).encode(strokeDash=dash)
     points = base.mark_point(filled=True, size=60, opacity=1).encode(
         color=_colour(report),
         shape=alt.Shape("device:N").legend(None),

@@ -80,6 +80,7 @@
     element("body").replaceChildren(body);
     const last = Math.min(place + PAGE, chosen.length);
     element("place").textContent = chosen.length ? `${place + 1} to ${last} of ${chosen.length}` : "no case matches";
+    element("pages").hidden = chosen.length > 0 && chosen.length <= PAGE;
     element("before").disabled = place === 0;
     element("after").disabled = last === chosen.length;
     for (const cell of element("head").children) {
@@ -98,15 +99,17 @@
     if (some.length <= MOST || (name !== "cost" && name !== "devices")) return some;
     return some.sort((a, b) => (soon(a) === soon(b) ? 0 : soon(a) - soon(b))).slice(0, MOST);
   }
-  function theme() {
+  function theme(values) {
+    const wide = Math.max(...values.map((row) => row.colour.length)) > 18;
     const dark = matchMedia("(prefers-color-scheme: dark)").matches, phone = innerWidth < 640;
     const [ink, soft, line] = dark ? ["#e6e7ea", "#a0a5b0", "#343841"] : ["#1c1e21", "#667", "#e2e4e8"];
     return {
       background: "transparent", font: "system-ui, sans-serif", view: { stroke: line },
       axis: { labelColor: ink, titleColor: ink, gridColor: line, domainColor: soft, tickColor: soft, titleFontWeight: "normal",
         labelFontSize: phone ? 10 : 11 },
-      legend: { labelColor: ink, titleColor: ink, labelLimit: phone ? 140 : 200, orient: phone ? "bottom" : "right",
-        columns: phone ? 2 : 1, symbolStrokeWidth: 2, titleFontWeight: "normal", symbolLimit: 60 },
+      legend: { labelColor: ink, titleColor: ink, labelLimit: phone ? (wide ? 280 : 130) : 200, orient: phone ? "bottom" : "right",
+        columns: phone && !wide ? 2 : 1, layout: { bottom: { direction: "vertical", anchor: "start" } }, symbolStrokeWidth: 2, titleFontWeight: "normal", symbolLimit: 60,
+        symbolBaseFillColor: soft, symbolBaseStrokeColor: soft },
     };
   }
   const used = (values) => new Set(values.map((row) => row.colour));
@@ -136,7 +139,7 @@
       figure.querySelector("figcaption").textContent = "No case matches.";
       return;
     }
-    const spec = { ...trimmed(chart.spec, values), config: theme(), datasets: { [source]: values }, autosize: { type: "fit-x", contains: "padding" } };
+    const spec = { ...trimmed(chart.spec, values), config: theme(values), datasets: { [source]: values }, autosize: { type: "fit-x", contains: "padding" } };
     const rowed = { occupancy: "colour", devices: "method" }[name];
     if (rowed) spec.height = 22 * Math.max(1, new Set(values.map((row) => row[rowed])).size);
     views[name] = await vegaEmbed(figure.querySelector(".chart"), spec, { actions: false, renderer: "canvas" });
