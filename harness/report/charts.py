@@ -13,7 +13,8 @@ import altair as alt
 from freepath.report.data import DEEPEST, HIGHEST, Report
 
 POINTS = 32
-SCIENTIFIC = {"format": "~e", "tickCount": 6, "labelSeparation": 8, "labelOverlap": "greedy"}
+APART = {"labelSeparation": 8, "labelOverlap": "greedy"}
+SCIENTIFIC = {"format": "~e", "tickCount": 6} | APART
 TIME, ERROR = "device time a ray [s]", "relative RMSE"
 CASE = [
     alt.Tooltip("method:N", title="case"),
@@ -58,6 +59,12 @@ def _hover() -> alt.Parameter:
     )
 
 
+def _dash() -> alt.StrokeDash:
+    """A dash a majorant; its legend shows strokes, not the points on them."""
+    legend = {"symbolType": "stroke", "symbolStrokeColor": "#888", "symbolStrokeWidth": 2}
+    return alt.StrokeDash("bound:N").title("majorant").legend(**legend)
+
+
 def cost(report: Report) -> alt.LayerChart:
     """RMSE over time of each case; a band shows the interval of the one that is pointed at."""
     hover = _hover()
@@ -79,7 +86,7 @@ def cost(report: Report) -> alt.LayerChart:
     lines = base.mark_line().encode(
         y=_error_axis(),
         color=_colour(report),
-        strokeDash=alt.StrokeDash("bound:N").title("majorant"),
+        strokeDash=_dash(),
         strokeWidth=alt.condition(hover, alt.value(4), alt.value(1.6)),
     )
     near = (
@@ -155,10 +162,10 @@ def _over_tightness(report: Report, field: str, title: str) -> alt.Chart:
         .transform_filter(f"datum.x !== null && datum.{field} > 0")
         .mark_line(point=True)
         .encode(
-            x=alt.X("x:Q").scale(type="log").axis(title="tightness", format="~g"),
+            x=alt.X("x:Q").scale(type="log").axis(title="tightness", format="~g", **APART),
             y=_y(f"{field}:Q", title),
             color=_colour(report),
-            strokeDash=alt.StrokeDash("bound:N").title("majorant"),
+            strokeDash=_dash(),
             detail=["label:N", "device:N"],
             tooltip=[*CASE, *COSTS],
         )

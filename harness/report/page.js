@@ -52,6 +52,12 @@
     return sorted.up ? less : -less;
   };
 
+  // Rows come in the order in which cases happened to end.
+  const questions = [...new Set(rows.map((row) => row.q))];
+  const soon = (row) => (typeof row.t1 === "number" ? row.t1 : Infinity);
+  const sooner = (a, b) => questions.indexOf(a.q) - questions.indexOf(b.q) || (soon(a) === soon(b) ? 0 : soon(a) - soon(b));
+  rows.sort(sooner);
+
   function choose() {
     const words = element("filter").value.toLowerCase().split(/\s+/).filter(Boolean);
     const device = element("device").value;
@@ -88,7 +94,6 @@
     }
   }
 
-  const soon = (row) => (typeof row.t1 === "number" ? row.t1 : Infinity);
   function shown(name) {
     const question = element("question").value;
     if (name === "confirm") {
