@@ -60,9 +60,7 @@ def _hover() -> alt.Parameter:
 
 
 def _dash() -> alt.StrokeDash:
-    """A dash a majorant; its legend shows strokes, not the points on them."""
-    legend = {"symbolType": "stroke", "symbolStrokeColor": "#888", "symbolStrokeWidth": 2}
-    return alt.StrokeDash("bound:N").title("majorant").legend(**legend)
+    return alt.StrokeDash("bound:N").title("majorant")
 
 
 def cost(report: Report) -> alt.LayerChart:
@@ -156,28 +154,27 @@ def pareto(report: Report) -> alt.LayerChart:
     return lines + points
 
 
-def _over_tightness(report: Report, field: str, title: str) -> alt.Chart:
-    return (
+def _over_tightness(report: Report, field: str, title: str) -> alt.LayerChart:
+    base = (
         alt.Chart(alt.NamedData("rows"))
         .transform_filter(f"datum.x !== null && datum.{field} > 0")
-        .mark_line(point=True)
         .encode(
             x=alt.X("x:Q").scale(type="log").axis(title="tightness", format="~g", **APART),
             y=_y(f"{field}:Q", title),
             color=_colour(report),
-            strokeDash=_dash(),
-            detail=["label:N", "device:N"],
-            tooltip=[*CASE, *COSTS],
+            detail=["label:N", "device:N", "bound:N"],
         )
     )
+    lines = base.mark_line().encode(strokeDash=_dash())
+    return lines + base.mark_point(filled=True, size=36).encode(tooltip=[*CASE, *COSTS])
 
 
-def tightness_time(report: Report) -> alt.Chart:
+def tightness_time(report: Report) -> alt.LayerChart:
     """Variance x time over tightness."""
     return _over_tightness(report, "vt", "relative variance x time [s]")
 
 
-def tightness_lookups(report: Report) -> alt.Chart:
+def tightness_lookups(report: Report) -> alt.LayerChart:
     """Variance x lookups over tightness."""
     return _over_tightness(report, "vl", "relative variance x lookups")
 
