@@ -15,6 +15,8 @@ from freepath.report.data import DEEPEST, HIGHEST, Report
 POINTS = 32
 APART = {"labelSeparation": 8, "labelOverlap": "greedy"}
 SCIENTIFIC = {"format": "~e", "tickCount": 6} | APART
+BELOW = alt.Legend(orient="bottom", direction="vertical", columns=1, labelLimit=320)
+"""Names of devices are long."""
 TIME, ERROR = "device time a ray [s]", "relative RMSE"
 CASE = [
     alt.Tooltip("method:N", title="case"),
@@ -138,9 +140,8 @@ def pareto(report: Report) -> alt.LayerChart:
         .transform_filter("datum.t <= datum.first")
         .encode(x=_x("time:Q", TIME), y=_error_axis())
     )
-    dash = alt.StrokeDash("device:N")
-    if len(report.values("device")) < 2:
-        dash = dash.legend(None)
+    several = len(report.values("device")) > 1
+    dash = alt.StrokeDash("device:N").legend(BELOW if several else None)
     lines = base.mark_line(color="#888", strokeWidth=1.5).encode(strokeDash=dash)
     points = base.mark_point(filled=True, size=60, opacity=1).encode(
         color=_colour(report),
@@ -220,7 +221,7 @@ def devices(report: Report) -> alt.Chart:
         .encode(
             x=_x("seconds:Q", f"{TIME} until the RMSE is as given"),
             y=alt.Y("method:N").title(None).axis(labelLimit=170),
-            color=alt.Color("device:N").scale(scheme="set1").legend(labelLimit=260),
+            color=alt.Color("device:N").scale(scheme="set1").legend(BELOW),
             shape=alt.Shape("error:N").scale(domain=["10 %", "1 %", "0.1 %"]).title("RMSE"),
             tooltip=[
                 *CASE,

@@ -94,6 +94,14 @@
     }
   }
 
+  // A case that another of its device starts no later than, with no more bias and variance x time, is never the best.
+  function undominated(some) {
+    const kept = [];
+    for (const row of [...some].sort((a, b) => a.t - b.t || a.b - b.b || a.vt - b.vt)) {
+      if (!kept.some((one) => one.device === row.device && one.b <= row.b && one.vt <= row.vt)) kept.push(row);
+    }
+    return kept;
+  }
   function shown(name) {
     const question = element("question").value;
     if (name === "confirm") {
@@ -101,6 +109,7 @@
       return data.confirmed.filter((row) => row.q === question && cases.has(row.case + row.device));
     }
     const some = chosen.filter((row) => row.q === question && row.v !== null);
+    if (name === "pareto") return undominated(some);
     if (some.length <= MOST || (name !== "cost" && name !== "devices")) return some;
     return some.sort((a, b) => (soon(a) === soon(b) ? 0 : soon(a) - soon(b))).slice(0, MOST);
   }
@@ -135,7 +144,7 @@
     const chart = data.charts[name], source = name === "confirm" ? "confirmed" : "rows";
     const values = shown(name), figure = element(`figure-${name}`);
     const total = name === "confirm" ? values.length : chosen.filter((row) => row.q === element("question").value && row.v !== null).length;
-    figure.querySelector("figcaption").textContent = values.length < total
+    figure.querySelector("figcaption").textContent = values.length < total && name !== "pareto"
       ? `The ${values.length} cases of ${total} that reach 1 % soonest; filter to see others.` : "";
     views[name]?.finalize();
     if (!values.length) {
@@ -199,7 +208,9 @@
   function refresh(name) {
     if (!visible.has(name) || !stale.has(name) || !window.vegaEmbed) return;
     stale.delete(name);
-    drawing = drawing.then(() => embed(name)).catch((error) => console.error(error));
+    // between two charts the browser may show the first, and answer
+    drawing = drawing.then(() => new Promise((resolve) => setTimeout(resolve))).then(() => embed(name))
+      .catch((error) => console.error(error));
   }
   function draw() {
     const question = element("question").value;
