@@ -17,6 +17,8 @@ from freepath.stats import Moments
 
 FOLDER = "pictures"
 """Within the folder of a run."""
+EQUAL_TIME = f"{FOLDER}/equal-time"
+"""Those of cases that had the same device time."""
 CAMERAS = ("orthographic", "perspective")
 """The kinds of rays that have a picture."""
 COLOURS = ("R", "G", "B")
@@ -56,7 +58,7 @@ def write_pictures(folder: Path, row: Mapping[str, Any], rays: Any, moments: Mom
     `rays` is the config's model of them. Without a camera, or where a device got but a few of the
     rays, there is no picture, and nothing is wrong.
     """
-    if rays.kind not in CAMERAS or len(moments.mean) != rays.resolution[0] * rays.resolution[1]:
+    if not has_picture(rays, len(moments.mean)):
         return ""
     mean, error = picture(moments.mean, rays.resolution), moments.variance / moments.count
     attributes = attributes_of(row)
@@ -64,12 +66,17 @@ def write_pictures(folder: Path, row: Mapping[str, Any], rays: Any, moments: Mom
     try:
         base.parent.mkdir(exist_ok=True)
         write_exr(base, mean, picture(error, rays.resolution), attributes)
-        write_png(base, mean, attributes)
+        write_mean(base, mean, attributes)
     except OSError as problem:
         return f"no picture: {problem.strerror or problem}"
     except FreepathError as problem:
         return f"no picture: {problem}"
     return ""
+
+
+def has_picture(rays: Any, count: int) -> bool:
+    """Whether so many rays are all pixels of a camera."""
+    return rays.kind in CAMERAS and count == rays.resolution[0] * rays.resolution[1]
 
 
 def picture(values: np.ndarray, resolution: Sequence[int]) -> np.ndarray:
@@ -133,18 +140,47 @@ def _spec(pixels: np.ndarray, part: str, attributes: Attributes) -> Any:
     return spec
 
 
-def write_png(base: Path, mean: np.ndarray, attributes: Attributes) -> None:
-    """Write a mean [height, width, channels] as sRGB; `freepath:exposure` is what it is times."""
+def read_exr(path: Path) -> tuple[Attributes, dict[str, np.ndarray]]:
+    """The attributes of a picture, and its parts [height, width, channels] in float64 by name.
+
+    Raises FreepathError where the file cannot be read.
+    """
     import OpenImageIO as oiio
 
+    image = oiio.ImageInput.open(str(path))
+    _check(image, image)
+    told: Attributes = {}
+    parts = {}
+    while image.seek_subimage(len(parts), 0):
+        spec = image.spec()
+        told |= {one.name: str(one.value) for one in spec.extra_attribs}
+        pixels = image.read_image(len(parts), 0, 0, spec.nchannels, oiio.FLOAT)
+        _check(pixels is not None, image)
+        parts[told["oiio:subimagename"]] = pixels.astype(np.float64)
+    image.close()
+    return told, parts
+
+
+def write_mean(base: Path, mean: np.ndarray, attributes: Attributes) -> None:
+    """Write a mean [height, width, channels] as PNG; `freepath:exposure` is what it is times."""
     shown, exposure = exposed(mean)
-    linear = oiio.ImageBuf(np.ascontiguousarray(shown, dtype=np.float32))
-    # not the configuration that $OCIO may name, which need not know these spaces
-    result = oiio.ImageBufAlgo.colorconvert(
-        linear, "lin_srgb", "sRGB", colorconfig="ocio://default"
-    )
+    write_png(base, shown, {**attributes, "freepath:exposure": f"{exposure:g}"})
+
+
+def write_png(
+    base: Path, pixels: np.ndarray, attributes: Attributes, *, linear: bool = True
+) -> None:
+    """Write RGB in [0, 1] as sRGB, `linear` or encoded already."""
+    import OpenImageIO as oiio
+
+    result = oiio.ImageBuf(np.ascontiguousarray(pixels, dtype=np.float32))
+    if linear:
+        # not the configuration that $OCIO may name, which need not know these spaces
+        result = oiio.ImageBufAlgo.colorconvert(
+            result, "lin_srgb", "sRGB", colorconfig="ocio://default"
+        )
     _check(not result.has_error, result)
-    for name, value in {**attributes, "freepath:exposure": f"{exposure:g}"}.items():
+    for name, value in attributes.items():
         result.specmod().attribute(name, value)
     with _replaced(base, ".png") as path:
         _check(result.write(str(path), oiio.UINT8), result)
@@ -152,15 +188,17 @@ def write_png(base: Path, mean: np.ndarray, attributes: Attributes) -> None:
             raise FreepathError("the PNG file could not be written to its end")
 
 
-def exposed(mean: np.ndarray) -> tuple[np.ndarray, float]:
+def exposed(mean: np.ndarray, exposure: float | None = None) -> tuple[np.ndarray, float]:
     """Return a mean as linear RGB in [0, 1], and what it was multiplied by.
 
-    White is a percentile of the positive values. Channels that are no colours are averaged.
+    White is a percentile of the positive values, unless an exposure is given. Channels that are no
+    colours are averaged.
     """
     colours = mean if mean.shape[2] == len(COLOURS) else mean.mean(axis=2, keepdims=True)
     finite = np.isfinite(colours)
     positive = colours[finite & (colours > 0.0)]
-    exposure = 1.0 / float(np.percentile(positive, BRIGHTEST)) if positive.size else 1.0
+    if exposure is None:
+        exposure = 1.0 / float(np.percentile(positive, BRIGHTEST)) if positive.size else 1.0
     shown = np.clip(np.where(finite, colours, 0.0) * exposure, 0.0, 1.0)
     shown = np.repeat(shown, len(COLOURS) // shown.shape[2], axis=2)
     shown[~finite.all(axis=2)] = NOT_A_NUMBER

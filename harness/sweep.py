@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
-from freepath import limits, majorants, source
+from freepath import equal_time, limits, majorants, source
 from freepath.binding import Scene, runner_of, structure_of
 from freepath.catalog import Catalog
 from freepath.confirm import confirmed_rows
@@ -54,6 +54,8 @@ class Sweep:
     render: bool = False
     """Whether cases whose rays have a picture get one."""
     time_build_s: float = 0.0
+    _shots: list[equal_time.Shot] = field(default_factory=list)
+    """Cases of the scene at work that were measured, where they get pictures."""
     _programs: dict[str, Program | BuildError] = field(default_factory=dict)
 
     def plan(self, case: Case, scene: Scene) -> Job:
@@ -163,6 +165,20 @@ class Sweep:
             self.on_progress(
                 sum(b.progress for b in open_ones), f"measuring {len(open_ones)} cases"
             )
+        self._render_at_equal_time()
+
+    def _render_at_equal_time(self) -> None:
+        """Pictures that can be compared, once it is known what a sample of each case takes."""
+        shots, self._shots = self._shots, []
+        if not shots:
+            return
+        self.on_progress(0.0, "pictures at equal time")
+        try:
+            told = equal_time.render(self.folder.folder, shots)
+        except RunError as error:
+            told = [str(error)]
+        if told:
+            self.folder.write_log(equal_time.LOG, "\n".join(told) + "\n")
 
     def _measured(self, job: Job, scene: Scene) -> None:
         found = job.bench.measurement
@@ -173,6 +189,10 @@ class Sweep:
         if self.render:
             wrong = write_pictures(self.folder.folder, row, job.case.rays, found.moments)
             row["reason"] = "; ".join(filter(None, (row["reason"], wrong)))
+            if row["status"] in ("ok", "mismatch"):
+                self._shots.append(
+                    equal_time.Shot(row, job.bench, job.case.rays, self._unbiased(job))
+                )
         confirmed = []
         if self.confirm and row["status"] == "ok" and values is not None:
             try:
@@ -180,6 +200,11 @@ class Sweep:
             except RunError as error:
                 return self._fail(job, error)
         return self._finish(job, row, round_rows(row, found), confirmed)
+
+    def _unbiased(self, job: Job) -> bool:
+        shadow = job.case.shadow
+        names = [job.case.tracker, *([] if shadow is None else [shadow.kind])]
+        return all(self.catalog.trackers[name].unbiased for name in names)
 
     def _fail(self, job: Job, error: FreepathError) -> None:
         """A case that cannot be built or run is a row; the others go on."""

@@ -125,11 +125,13 @@ def _method(row: Row) -> str:
     parts = [tracker_label(row)]
     if row["majorant"] != "none":
         parts.append(f"{row['majorant']} x{number(row, 'tightness'):g}")
-    if row["shadow"] not in ("", "none"):
-        parts.append(f"shadow {row['shadow']}")
-    if row["composition"] == "all":
-        parts.append("all effects")
-    return " ".join(parts)
+    return " ".join([*parts, *along(row)])
+
+
+def along(row: Row) -> list[str]:
+    """How shadow rays are followed and what is compiled, where a case says so."""
+    parts = [] if row["shadow"] in ("", "none") else [f"shadow {row['shadow']}"]
+    return parts + (["all effects"] if row["composition"] == "all" else [])
 
 
 def _cells(row: Row, *, best: bool) -> list[str]:
@@ -151,7 +153,8 @@ def _cells(row: Row, *, best: bool) -> list[str]:
     ]
 
 
-def _bounces(row: Row) -> str:
+def bounces(row: Row) -> str:
+    """How many scatterings are followed."""
     count = row["scatterings"]
     return f"{count} scattering" if count == "1" else f"{count} scatterings"
 
@@ -188,7 +191,7 @@ def table_of(rows: list[Row]) -> Table:
     first = rows[0]
     reference = next((short(number(row, "reference"), 4) for row in rows if row["reference"]), "?")
     rays = "1 ray" if first["rays"] == "1" else f"{first['rays']} rays"
-    lit = "" if first["light"] in ("", "none") else f" in {first['light']}, {_bounces(first)}"
+    lit = "" if first["light"] in ("", "none") else f" in {first['light']}, {bounces(first)}"
     title = f"{first['estimand']} of {first['medium']}{lit}, {rays}, reference {reference}"
     table = Table(title=escape(title), title_justify="left", title_style="bold", box=None)
     table.padding = (0, 1, 0, 0)

@@ -26,7 +26,8 @@ ORDER = (
     ("measure",),
     ("results",),
     ("rows", "table", "binding", "confirm", "pictures"),
-    ("sweep", "report", "compare"),
+    ("equal_time", "report", "compare"),
+    ("sweep",),
     ("session", "arguments", "device_setup"),
     ("api", "check"),
     ("candidate", "recommend"),
@@ -38,7 +39,8 @@ PLACE = {name: place for place, names in enumerate(ORDER) for name in names}
 LONGEST = 300
 ONLY_CSV = {
     "table": {"errors"},
-    "report": {"errors", "results", "table", "report", "version"},
+    # the pictures of a run are files beside its CSV
+    "report": {"errors", "results", "table", "report", "version", "pictures"},
     "compare": {"errors", "results", "table", "compare"},
     "results": {"errors"},
 }

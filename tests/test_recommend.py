@@ -1,6 +1,7 @@
 """`freepath recommend`: the soonest case of a volume, and what cannot be asked."""
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -56,11 +57,33 @@ def test_named_with_a_config_that_measures_it_again(call, cloud, monkeypatch):
         (["cloud.npy", "--budget", "-1"], 2, "expected a number above 0"),
         (["cloud.npy", "-R", "("], 2, "expected a regular expression"),
         (["cloud.npy", "-R", "none"], 5, "no tracker of transmittance matches 'none'"),
+        (["cloud.npy", "--accuracy", "nan"], 2, "expected a relative error such as 1%"),
+        (["cloud.npy", "--accuracy=-1%"], 2, "expected a relative error such as 1%"),
+        (["cloud.npy", "--budget", "0"], 2, "expected a number above 0"),
+        (["cloud.npy", "--sigma-t", "inf"], 2, "expected a number above 0"),
+        (["."], 2, ".: expected a volume, got a folder"),
+        (["empty.npy"], 2, "empty.npy: is empty: expected a density above 0"),
+        (
+            ["nan.npy"],
+            2,
+            "nan.npy: densities that cannot be used: 1 NaN (first [z, y, x] = [2, 3, 4])",
+        ),
+        (["flat.npy"], 2, "flat.npy: expected an array of rank 3"),
+        (["text.vdb"], 2, "text.vdb: is not an OpenVDB file"),
+        (["text.exr"], 2, "text.exr: is not an image"),
         (["cloud.npy", "--grid", "density"], 2, "only OpenVDB files have named grids"),
     ],
 )
 def test_what_cannot_be_asked(call, cloud, arguments, code, told):
+    odd = np.ones((8, 8, 8), np.float32)
+    np.save("empty.npy", 0 * odd)
+    np.save("flat.npy", odd[0])
+    odd[2, 3, 4] = np.nan
+    np.save("nan.npy", odd)
+    for name in ("text.vdb", "text.exr"):
+        Path(name).write_text("text")
     found, text = call(*arguments)
+    assert "Traceback" not in text
     assert (found, told in text) == (code, True), text
 
 

@@ -104,6 +104,10 @@ def test_rejected_with_what_was_measured(call, file, monkeypatch):
     ("old", "new", "code", "told"),
     [
         ("walk_begin(path", "wlk_begin(path", 8, "newcomer.cl"),
+        ("const real sigma_n =", "const real sigma_n", 8, "newcomer.cl:17"),
+        ("void step(", "void stap(", 2, "newcomer.cl:1:1: expected the function step"),
+        ("maximum: 1", "maximum: abc", 2, "newcomer.cl:8:48: parameters.threshold.maximum"),
+        ("---*/", "*/", 2, "newcomer.cl:1:1: expected front matter"),
         ("needs: [majorant]", "needs: [majorent]", 2, "newcomer.cl:4:9: needs[0]"),
         ("/*---", "/*", 2, "expected front matter"),
         ("estimands: [transmittance]", "estimands: [mean_extinction]", 2, "expected transmittance"),

@@ -31,8 +31,10 @@ def volume_of(file: Path, sigma_t: float, grid: str | None = None) -> dict[str, 
     from freepath.scene.volumes import read_volume
 
     if not file.is_file():
-        raise VolumeError(f"{file}: expected a volume, got no file")
-    read_volume(file, grid)
+        what = "a folder" if file.is_dir() else "no file"
+        raise VolumeError(f"{file}: expected a volume, got {what}")
+    if not read_volume(file, grid).densities.any():
+        raise VolumeError(f"{file}: is empty: expected a density above 0 in a voxel at least")
     named = {} if grid is None else {"grid": grid}
     return {"file": str(file.resolve()), "sigma_t": sigma_t, **named}
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from argparse import Namespace
 from pathlib import Path
 from typing import Any
@@ -27,7 +28,8 @@ def add(commands: Any) -> None:
         "--output",
         type=Path,
         metavar="FILE",
-        help="where to write it: .html, .md, .svg or .png (default: report.html in RESULT)",
+        help="where to write it: .html, .md, .svg or .png, - to print it (default: report.html or "
+        "a picture in RESULT; Markdown is printed)",
     ).complete = shtab.FILE
     report.add_argument(
         "--format",
@@ -49,6 +51,12 @@ def execute(options: Namespace) -> int:
     from freepath.commands.common import console_of
     from freepath.report.text import summary
 
+    markdown = options.format == "md" and not options.output
+    if markdown or options.output == report.STANDARD_OUTPUT:
+        _, data, _ = report.made(options.result, options.output, options.format, options.chart)
+        sys.stdout.flush()
+        sys.stdout.buffer.write(data)
+        return 0
     found, path = report.write(options.result, options.output, options.format, options.chart)
     console = console_of()
     console.print(summary(found))

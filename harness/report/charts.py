@@ -11,56 +11,28 @@ from collections.abc import Callable
 from typing import Any
 
 import altair as alt
-from freepath.report.data import DEEPEST, HIGHEST, Report
+from freepath.report.axes import (
+    APART,
+    BELOW,
+    CASE,
+    COSTS,
+    ERROR,
+    TIME,
+    colour_of,
+    dash_of,
+    error_axis,
+    hover_of,
+    log_x,
+    log_y,
+)
+from freepath.report.data import DEEPEST, Report
 
 POINTS = 32
-SCIENTIFIC = {"format": "~e", "tickCount": 6}
-TIME, ERROR = "device time a ray [s]", "relative RMSE"
-CASE = [
-    alt.Tooltip("method:N", title="case"),
-    alt.Tooltip("device:N"),
-]
-COSTS = [
-    alt.Tooltip("t:Q", title="time a sample [s]", format=".3~e"),
-    alt.Tooltip("lookups:Q", title="lookups a sample", format=".3~g"),
-    alt.Tooltip("v:Q", title="relative variance", format=".3~e"),
-    alt.Tooltip("occupancy:Q", title="lane occupancy", format=".0%"),
-]
-
-
-def _x(field: str, title: str) -> alt.X:
-    return alt.X(field).scale(type="log").axis(title=title, **SCIENTIFIC)
-
-
-def _y(field: str, title: str) -> alt.Y:
-    return alt.Y(field).scale(type="log").axis(title=title, **SCIENTIFIC)
-
-
-def _error_axis() -> alt.Y:
-    return (
-        alt.Y("error:Q")
-        .scale(type="log", domain=[DEEPEST, HIGHEST], clamp=True)
-        .axis(title=ERROR, **SCIENTIFIC)
-    )
-
-
-def _colour(report: Report) -> alt.Color:
-    """One colour a tracker, the same in all charts."""
-    names = list(dict.fromkeys(row["colour"] for row in report.measured))
-    scheme = "tableau10" if len(names) <= 10 else "tableau20"
-    return alt.Color("colour:N").scale(scheme=scheme, domain=names).title("tracker")
-
-
-def _hover() -> alt.Parameter:
-    # not `nearest`: Vega-Lite's tooltip then has no names, only numbers
-    return alt.selection_point(
-        name="hover", on="pointerover", fields=["id"], empty=False, clear="pointerout"
-    )
 
 
 def cost(report: Report) -> alt.LayerChart:
     """RMSE over time of each case; a band shows the interval of the one that is pointed at."""
-    hover = _hover()
+    hover = hover_of()
     noise = "0.5 * datum.v * datum.t / datum.time / pow(datum.error, 2)"
     width = f"{noise} * sqrt(pow(datum.vn || 0, 2) + pow(datum.tn || 0, 2))"
     base = (
@@ -74,19 +46,19 @@ def cost(report: Report) -> alt.LayerChart:
             width=width,
             samples="datum.time / datum.t",
         )
-        .encode(x=_x("time:Q", TIME), detail="id:N")
+        .encode(x=log_x("time:Q", TIME), detail="id:N")
     )
     lines = base.mark_line().encode(
-        y=_error_axis(),
-        color=_colour(report),
-        strokeDash=alt.StrokeDash("bound:N").title("majorant"),
+        y=error_axis(),
+        color=colour_of(report),
+        strokeDash=dash_of(),
         strokeWidth=alt.condition(hover, alt.value(4), alt.value(1.6)),
     )
     near = (
         base.mark_point(filled=True)
         .encode(
-            y=_error_axis(),
-            color=_colour(report),
+            y=error_axis(),
+            color=colour_of(report),
             opacity=alt.condition("datum.grid == 0", alt.value(1), alt.value(0)),
             size=alt.condition("datum.grid == 0", alt.value(36), alt.value(150)),
             tooltip=[
@@ -107,9 +79,9 @@ def cost(report: Report) -> alt.LayerChart:
         )
         .mark_area(clip=True)
         .encode(
-            y=_error_axis(),
+            y=error_axis(),
             y2="top:Q",
-            color=_colour(report),
+            color=colour_of(report),
             opacity=alt.condition(hover, alt.value(0.25), alt.value(0)),
         )
     )
@@ -131,11 +103,13 @@ def pareto(report: Report) -> alt.LayerChart:
         .transform_filter("datum.error <= datum.best * 1.000001")
         .transform_joinaggregate(first="min(t)", groupby=["grid", "device"])
         .transform_filter("datum.t <= datum.first")
-        .encode(x=_x("time:Q", TIME), y=_error_axis())
+        .encode(x=log_x("time:Q", TIME), y=error_axis())
     )
-    lines = base.mark_line(color="#888", strokeWidth=1.5).encode(strokeDash="device:N")
+    several = len(report.values("device")) > 1
+    dash = alt.StrokeDash("device:N").legend(BELOW if several else None)
+    lines = base.mark_line(color="#888", strokeWidth=1.5).encode(strokeDash=dash)
     points = base.mark_point(filled=True, size=60, opacity=1).encode(
-        color=_colour(report),
+        color=colour_of(report),
         shape=alt.Shape("device:N").legend(None),
         tooltip=[
             *CASE,
@@ -146,28 +120,27 @@ def pareto(report: Report) -> alt.LayerChart:
     return lines + points
 
 
-def _over_tightness(report: Report, field: str, title: str) -> alt.Chart:
-    return (
+def _over_tightness(report: Report, field: str, title: str) -> alt.LayerChart:
+    base = (
         alt.Chart(alt.NamedData("rows"))
         .transform_filter(f"datum.x !== null && datum.{field} > 0")
-        .mark_line(point=True)
         .encode(
-            x=alt.X("x:Q").scale(type="log").axis(title="tightness", format="~g"),
-            y=_y(f"{field}:Q", title),
-            color=_colour(report),
-            strokeDash=alt.StrokeDash("bound:N").title("majorant"),
-            detail=["label:N", "device:N"],
-            tooltip=[*CASE, *COSTS],
+            x=alt.X("x:Q").scale(type="log").axis(title="tightness", format="~g", **APART),
+            y=log_y(f"{field}:Q", title),
+            color=colour_of(report),
+            detail=["label:N", "device:N", "bound:N"],
         )
     )
+    lines = base.mark_line().encode(strokeDash=dash_of())
+    return lines + base.mark_point(filled=True, size=36).encode(tooltip=[*CASE, *COSTS])
 
 
-def tightness_time(report: Report) -> alt.Chart:
+def tightness_time(report: Report) -> alt.LayerChart:
     """Variance x time over tightness."""
     return _over_tightness(report, "vt", "relative variance x time [s]")
 
 
-def tightness_lookups(report: Report) -> alt.Chart:
+def tightness_lookups(report: Report) -> alt.LayerChart:
     """Variance x lookups over tightness."""
     return _over_tightness(report, "vl", "relative variance x lookups")
 
@@ -183,8 +156,8 @@ def lights(report: Report) -> alt.Chart:
         .mark_line(point=True)
         .encode(
             x=alt.X("light:N").sort(order).axis(title="light", labelLimit=160, labelAngle=-25),
-            y=_y("best:Q", "relative variance x time [s]"),
-            color=_colour(report),
+            y=log_y("best:Q", "relative variance x time [s]"),
+            color=colour_of(report),
             detail=["label:N", "device:N"],
             tooltip=["label:N", "light:N", alt.Tooltip("best:Q", format=".3~e")],
         )
@@ -198,9 +171,9 @@ def lookups(report: Report) -> alt.Chart:
         .transform_filter("datum.lookups > 0")
         .mark_point(filled=True, size=60)
         .encode(
-            x=_x("lookups:Q", "lookups a sample"),
-            y=_y("t:Q", "time a sample [s]"),
-            color=_colour(report),
+            x=log_x("lookups:Q", "lookups a sample"),
+            y=log_y("t:Q", "time a sample [s]"),
+            color=colour_of(report),
             shape=alt.Shape("bound:N").title("majorant"),
             tooltip=[*CASE, *COSTS],
         )
@@ -215,7 +188,7 @@ def occupancy(report: Report) -> alt.Chart:
         .encode(
             x=alt.X("occupancy:Q").scale(domain=[0, 1]).axis(title="lane occupancy", format="%"),
             y=alt.Y("colour:N").title(None).axis(labelLimit=150),
-            color=_colour(report).legend(None),
+            color=colour_of(report).legend(None),
             tooltip=[*CASE, *COSTS],
         )
     )
@@ -230,9 +203,9 @@ def devices(report: Report) -> alt.Chart:
         .transform_calculate(error="{t10: '10 %', t1: '1 %', t01: '0.1 %'}[datum.error]")
         .mark_point(filled=True, size=60, opacity=0.9)
         .encode(
-            x=_x("seconds:Q", f"{TIME} until the RMSE is as given"),
+            x=log_x("seconds:Q", f"{TIME} until the RMSE is as given"),
             y=alt.Y("method:N").title(None).axis(labelLimit=170),
-            color=alt.Color("device:N").scale(scheme="set1").legend(labelLimit=260),
+            color=alt.Color("device:N").scale(scheme="set1").legend(BELOW),
             shape=alt.Shape("error:N").scale(domain=["10 %", "1 %", "0.1 %"]).title("RMSE"),
             tooltip=[
                 *CASE,
@@ -246,7 +219,7 @@ def devices(report: Report) -> alt.Chart:
 def confirm(report: Report) -> alt.LayerChart:
     """Measured over predicted RMSE, with the interval of what was measured."""
     base = alt.Chart(alt.NamedData("confirmed")).encode(
-        x=_x("predicted:Q", "predicted relative RMSE")
+        x=log_x("predicted:Q", "predicted relative RMSE")
     )
     near = alt.Scale(domain=[0.5, 1.5], clamp=True)
     y = alt.Y("ratio:Q", scale=near, title="measured / predicted")
@@ -255,11 +228,11 @@ def confirm(report: Report) -> alt.LayerChart:
     intervals = base.mark_rule(opacity=0.5, clip=True).encode(
         y=alt.Y("low:Q", scale=near),
         y2="high:Q",
-        color=_colour(report),
+        color=colour_of(report),
     )
     points = base.mark_point(filled=True, size=40).encode(
         y=y,
-        color=_colour(report),
+        color=colour_of(report),
         tooltip=[
             *CASE,
             alt.Tooltip("samples:Q", title="samples a ray"),

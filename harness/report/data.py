@@ -11,7 +11,7 @@ from typing import Any
 
 from freepath.errors import FreepathError
 from freepath.results import CHECKS, CONFIRM, CONFIRM_COLUMNS, RUN, SUMMARY, read_rows
-from freepath.table import Row, number, tracker_label
+from freepath.table import Row, along, bounces, number, tracker_label
 
 DEEPEST, HIGHEST = 1e-4, 10.0
 """Relative errors between which curves are drawn."""
@@ -30,6 +30,8 @@ class Report:
     confirmed: list[dict[str, Any]] = field(default_factory=list)
     runs: list[dict[str, Any]] = field(default_factory=list)
     """Name and run.json of each result."""
+    places: list[tuple[Path, dict[tuple[str, ...], dict[str, Any]]]] = field(default_factory=list)
+    """The folder of each result, with its records by case_id, device and platform."""
 
     @property
     def measured(self) -> list[dict[str, Any]]:
@@ -43,7 +45,7 @@ class Report:
 
 def load(results: Sequence[Path]) -> Report:
     """Read results; raises FreepathError where one of them cannot be read."""
-    report, known = Report(), []
+    report = Report()
     given = [(name, path, _summary(path)) for name, path in _named(results)]
     devices = _devices([(name, row) for name, _, rows in given for row in rows])
     for name, path, rows in given:
@@ -53,7 +55,7 @@ def load(results: Sequence[Path]) -> Report:
             record = _record(row, methods, devices[name, _device(row)])
             records[row["case_id"], row["device"], row["platform"]] = record
             report.rows.append(record)
-        known.append((path, records))
+        report.places.append((path, records))
         report.runs.append({"name": name, "checks": _checks(path)} | _facts(path))
     for question in report.values("q"):
         _span([row for row in report.measured if row["q"] == question])
@@ -62,7 +64,7 @@ def load(results: Sequence[Path]) -> Report:
     labels = {row["label"] for row in report.rows}
     for row in report.rows:
         row["colour"] = row["label"] if len(labels) <= COLOURS else row["tracker"]
-    for path, records in known:
+    for path, records in report.places:
         report.confirmed += _confirmed(path, records)
     return report
 
@@ -125,17 +127,15 @@ def _variants(rows: list[Row]) -> list[tuple[str, str]]:
 
 def _record(row: Row, variants: list[tuple[str, str]], device: str) -> dict[str, Any]:
     """A row as charts and tables use it; errors and variances are relative to the reference."""
-    label = ", ".join([tracker_label(row), *(text.format(row[name]) for name, text in variants)])
+    words = [text.format(row[name]) for name, text in variants]
+    label = ", ".join([tracker_label(row), *along(row), *words])
     none = row["majorant"] == "none"
     tightness = None if none else number(row, "tightness")
     majorant = "none" if none else f"{row['majorant']} x{tightness:g}"
-    scene = f"{row['estimand']}, {row['medium']}, {row['rays'] or '?'} rays"
-    lit = row["light"] not in ("", "none")
-    bounces = f", scatterings: {row['scatterings']}" if lit else ""
     record = {
-        "q": f"{scene}, {row['light']}{bounces}" if lit else scene,
-        "scene": f"{scene}{bounces}",
-        "light": row["light"] if lit else None,
+        "q": _question(row, row["light"]),
+        "scene": _question(row),
+        "light": row["light"] if _lit(row) else None,
         "device": device,
         "case": row["case"],
         "label": label,
@@ -157,18 +157,31 @@ def _record(row: Row, variants: list[tuple[str, str]], device: str) -> dict[str,
     return record | _errors(row) | {name: _time(row[column]) for name, column in LADDER.items()}
 
 
+def _lit(row: Row) -> bool:
+    return row["light"] not in ("", "none")
+
+
+def _question(row: Row, *light: str) -> str:
+    """What a row answers: only rows of one question are compared. Without a light: in any light."""
+    lit = [*light, bounces(row)] if _lit(row) else []
+    return ", ".join([row["estimand"], row["medium"], *lit, f"{row['rays'] or '?'} rays"])
+
+
 def _errors(row: Row) -> dict[str, float | None]:
+    """Errors relative to the reference; where it is unknown, to the estimate, taken as unbiased."""
     reference, variance = number(row, "reference"), number(row, "variance")
     names = ("v", "b", "bias", "bias_width", "vt", "vl")
-    if not reference or variance is None or row["status"] != "ok":
+    known = reference is not None
+    scale = abs((reference if known else number(row, "estimate")) or 0.0)
+    if not scale or variance is None or row["status"] != "ok":
         return dict.fromkeys(names)
     bias, stderr, rms = (number(row, c) or 0.0 for c in ("bias", "bias_stderr", "bias_rms"))
-    relative = variance / reference**2
+    relative = variance / scale**2
     values = (
         relative,
-        rms / abs(reference),
-        bias / abs(reference),
-        1.96 * stderr / abs(reference),
+        rms / scale,
+        bias / scale if known else None,
+        1.96 * stderr / scale,
         relative * number(row, "time_per_sample_s"),
         relative * number(row, "lookups_per_sample"),
     )

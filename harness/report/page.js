@@ -52,6 +52,12 @@
     return sorted.up ? less : -less;
   };
 
+  // Rows come in the order in which cases happened to end.
+  const questions = [...new Set(rows.map((row) => row.q))];
+  const soon = (row) => (typeof row.t1 === "number" ? row.t1 : Infinity);
+  const sooner = (a, b) => questions.indexOf(a.q) - questions.indexOf(b.q) || (soon(a) === soon(b) ? 0 : soon(a) - soon(b));
+  rows.sort(sooner);
+
   function choose() {
     const words = element("filter").value.toLowerCase().split(/\s+/).filter(Boolean);
     const device = element("device").value;
@@ -80,6 +86,7 @@
     element("body").replaceChildren(body);
     const last = Math.min(place + PAGE, chosen.length);
     element("place").textContent = chosen.length ? `${place + 1} to ${last} of ${chosen.length}` : "no case matches";
+    element("pages").hidden = chosen.length > 0 && chosen.length <= PAGE;
     element("before").disabled = place === 0;
     element("after").disabled = last === chosen.length;
     for (const cell of element("head").children) {
@@ -87,7 +94,14 @@
     }
   }
 
-  const soon = (row) => (typeof row.t1 === "number" ? row.t1 : Infinity);
+  // A case that another of its device starts no later than, with no more bias and variance x time, is never the best.
+  function undominated(some) {
+    const kept = [];
+    for (const row of [...some].sort((a, b) => a.t - b.t || a.b - b.b || a.vt - b.vt)) {
+      if (!kept.some((one) => one.device === row.device && one.b <= row.b && one.vt <= row.vt)) kept.push(row);
+    }
+    return kept;
+  }
   function shown(name) {
     const question = element("question").value;
     if (name === "confirm") {
@@ -95,18 +109,21 @@
       return data.confirmed.filter((row) => row.q === question && cases.has(row.case + row.device));
     }
     const some = chosen.filter((row) => row.q === question && row.v !== null);
+    if (name === "pareto") return undominated(some);
     if (some.length <= MOST || (name !== "cost" && name !== "devices")) return some;
     return some.sort((a, b) => (soon(a) === soon(b) ? 0 : soon(a) - soon(b))).slice(0, MOST);
   }
-  function theme() {
+  function theme(values) {
+    const wide = Math.max(...values.map((row) => row.colour.length)) > 18;
     const dark = matchMedia("(prefers-color-scheme: dark)").matches, phone = innerWidth < 640;
     const [ink, soft, line] = dark ? ["#e6e7ea", "#a0a5b0", "#343841"] : ["#1c1e21", "#667", "#e2e4e8"];
     return {
       background: "transparent", font: "system-ui, sans-serif", view: { stroke: line },
       axis: { labelColor: ink, titleColor: ink, gridColor: line, domainColor: soft, tickColor: soft, titleFontWeight: "normal",
         labelFontSize: phone ? 10 : 11 },
-      legend: { labelColor: ink, titleColor: ink, labelLimit: phone ? 140 : 200, orient: phone ? "bottom" : "right",
-        columns: phone ? 2 : 1, symbolStrokeWidth: 2, titleFontWeight: "normal", symbolLimit: 60 },
+      legend: { labelColor: ink, titleColor: ink, labelLimit: phone ? (wide ? 280 : 130) : 200, orient: phone ? "bottom" : "right",
+        columns: phone && !wide ? 2 : 1, layout: { bottom: { direction: "vertical", anchor: "start" } }, symbolStrokeWidth: 2, titleFontWeight: "normal", symbolLimit: 60,
+        symbolBaseFillColor: soft, symbolBaseStrokeColor: soft },
     };
   }
   const used = (values) => new Set(values.map((row) => row.colour));
@@ -127,7 +144,7 @@
     const chart = data.charts[name], source = name === "confirm" ? "confirmed" : "rows";
     const values = shown(name), figure = element(`figure-${name}`);
     const total = name === "confirm" ? values.length : chosen.filter((row) => row.q === element("question").value && row.v !== null).length;
-    figure.querySelector("figcaption").textContent = values.length < total
+    figure.querySelector("figcaption").textContent = values.length < total && name !== "pareto"
       ? `The ${values.length} cases of ${total} that reach 1 % soonest; filter to see others.` : "";
     views[name]?.finalize();
     if (!values.length) {
@@ -136,23 +153,71 @@
       figure.querySelector("figcaption").textContent = "No case matches.";
       return;
     }
-    const spec = { ...trimmed(chart.spec, values), config: theme(), datasets: { [source]: values }, autosize: { type: "fit-x", contains: "padding" } };
+    const spec = { ...trimmed(chart.spec, values), config: theme(values), datasets: { [source]: values }, autosize: { type: "fit-x", contains: "padding" } };
     const rowed = { occupancy: "colour", devices: "method" }[name];
     if (rowed) spec.height = 22 * Math.max(1, new Set(values.map((row) => row[rowed])).size);
     views[name] = await vegaEmbed(figure.querySelector(".chart"), spec, { actions: false, renderer: "canvas" });
+  }
+  function picture(address, text) {
+    const image = new Image();
+    image.src = address;
+    image.alt = text;
+    image.title = text;
+    return image;
+  }
+  function caption(text) {
+    const line = document.createElement("figcaption");
+    line.textContent = text;
+    return line;
+  }
+  function render() {
+    const question = element("question").value, ids = new Set(chosen.map((row) => row.id));
+    const panels = data.renders.filter((one) => one.q === question)
+      .map((one) => ({ ...one, items: one.items.filter((item) => ids.has(item.id)) }))
+      .filter((one) => one.items.length);
+    element("renders").hidden = !panels.length;
+    const body = document.createDocumentFragment();
+    for (const one of panels) {
+      const grid = document.createElement("div"), several = data.renders.some((other) => other.device !== one.device);
+      grid.className = "renders";
+      const reference = { method: "what it should be", picture: one.reference };
+      for (const item of [reference, ...one.items]) {
+        const figure = document.createElement("figure"), title = document.createElement("h3"), pair = document.createElement("div");
+        title.textContent = item.method;
+        pair.className = "pair";
+        pair.append(picture(item.picture, item.method));
+        figure.append(title, pair);
+        if (item.error) {
+          pair.append(picture(item.error, `error of ${item.method}`));
+          figure.append(caption(`${item.samples} samples, ${seconds(item.time)} a pixel; relative RMSE ${percent(item.rmse)}`));
+        } else {
+          const scale = document.createElement("div");
+          scale.className = "scale";
+          figure.append(caption(`The mean of all unbiased cases${several ? `, ${one.device}` : ""}. Errors: 0 to ${percent(one.brightest)} of its mean`), scale);
+        }
+        grid.append(figure);
+      }
+      body.append(grid);
+    }
+    element("renders-hint").textContent = "Each case had the same device time; beside each picture its error, " +
+      "the brighter the larger. The exposure and the scale of errors are the same for all.";
+    element("renders-body").replaceChildren(body);
   }
   const visible = new Set(), stale = new Set();
   let drawing = Promise.resolve();
   function refresh(name) {
     if (!visible.has(name) || !stale.has(name) || !window.vegaEmbed) return;
     stale.delete(name);
-    drawing = drawing.then(() => embed(name)).catch((error) => console.error(error));
+    // between two charts the browser may show the first, and answer
+    drawing = drawing.then(() => new Promise((resolve) => setTimeout(resolve))).then(() => embed(name))
+      .catch((error) => console.error(error));
   }
   function draw() {
     const question = element("question").value;
     const count = chosen.filter((row) => row.q === question).length;
     element("count").textContent = `${count} cases of this question, ${chosen.length} in all`;
     for (const name of Object.keys(data.charts)) { stale.add(name); refresh(name); }
+    render();
   }
   window.freepathReady = () => drawing;
 

@@ -13,6 +13,7 @@ from typing import Any
 
 from freepath.report.charts import ACROSS, CHARTS, useful
 from freepath.report.data import Report
+from freepath.report.renders import panels
 from freepath.report.text import environment
 from freepath.version import __version__
 
@@ -36,6 +37,7 @@ def page(report: Report) -> str:
         "rows": [[_rounded(row.get(name)) for name in FIELDS] for row in report.rows],
         "confirmed": report.confirmed,
         "charts": shown,
+        "renders": panels(report),
     }
     title = f"freepath: {', '.join(run['name'] for run in report.runs)}"
     parts = {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+import warnings
 from typing import Any
 
 from freepath.errors import FreepathError, did_you_mean
@@ -61,15 +61,17 @@ def _with_data(chart: Any, data: Any) -> Any:
     return chart
 
 
-def save(report: Report, name: str, output: Path) -> None:
-    """Draw a chart into a .svg or .png."""
+def drawn(report: Report, name: str, kind: str) -> bytes:
+    """A chart as `kind`, svg or png."""
     import vl_convert
 
-    specification = _still(picture(report, name).to_dict())
-    if output.suffix.lower() == ".png":
-        output.write_bytes(vl_convert.vegalite_to_png(specification, scale=2.0))
-    else:
-        output.write_text(vl_convert.vegalite_to_svg(specification), encoding="utf-8")
+    with warnings.catch_warnings():
+        # parameters of panels have one name; a still picture has none of them
+        warnings.filterwarnings("ignore", message="Automatically deduplicated")
+        specification = _still(picture(report, name).to_dict())
+    if kind == "png":
+        return vl_convert.vegalite_to_png(specification, scale=2.0)
+    return vl_convert.vegalite_to_svg(specification).encode()
 
 
 def _still(part: Any) -> Any:

@@ -53,7 +53,8 @@ def cells(row: dict[str, Any]) -> list[str]:
     """A case's row of the full table."""
     if row["v"] is None:
         return [row["method"], row["device"], *[""] * 4, row["status"], *[""] * len(TARGETS)]
-    bias = f"{100 * row['bias']:+.2g}±{100 * row['bias_width']:.1g}%"
+    known = row["bias"] is not None
+    bias = f"{100 * row['bias']:+.2g}±{100 * row['bias_width']:.1g}%" if known else ""
     return [
         row["method"],
         row["device"],

@@ -11,8 +11,13 @@ from freepath.report.data import Report, load
 FORMATS = ("html", "md", "svg", "png")
 
 
+STANDARD_OUTPUT = Path("-")
+
+
 def format_of(output: Path | None, wanted: str | None) -> str:
     """The format: as asked for, else as the file is named, else a page."""
+    if output == STANDARD_OUTPUT:
+        return wanted or "md"
     suffix = output.suffix.lower()[1:] if output else ""
     if wanted is None and output and suffix not in FORMATS:
         expected = ", ".join(f".{name}" for name in FORMATS)
@@ -30,24 +35,31 @@ def write(
     Raises FreepathError where a result cannot be read, a file not be written, or a chart has
     nothing to show.
     """
+    report, data, chosen = made(results, output, wanted, chart)
+    output = output or results[0] / f"report.{chosen}"
+    try:
+        output.write_bytes(data)
+    except OSError as error:
+        raise FreepathError(f"cannot write {output}: {error.strerror}") from error
+    return report, output
+
+
+def made(
+    results: Sequence[Path], output: Path | None, wanted: str | None, chart: str = "cost"
+) -> tuple[Report, bytes, str]:
+    """The report of results, what a file of it holds, and its format; raises as `write` does."""
     chosen = format_of(output, wanted)
     report = load(results)
     if not report.measured:
         raise FreepathError("the result has no case that was measured, so there is no report of it")
-    output = output or results[0] / f"report.{chosen}"
-    try:
-        if chosen == "html":
-            from freepath.report.page import page
+    if chosen == "html":
+        from freepath.report.page import page
 
-            output.write_text(page(report), encoding="utf-8")
-        elif chosen == "md":
-            from freepath.report.text import markdown
+        return report, page(report).encode(), chosen
+    if chosen == "md":
+        from freepath.report.text import markdown
 
-            output.write_text(markdown(report), encoding="utf-8")
-        else:
-            from freepath.report.pictures import save
+        return report, markdown(report).encode(), chosen
+    from freepath.report.pictures import drawn
 
-            save(report, chart, output)
-    except OSError as error:
-        raise FreepathError(f"cannot write {output}: {error.strerror}") from error
-    return report, output
+    return report, drawn(report, chart, chosen), chosen

@@ -1,0 +1,91 @@
+"""Pictures of cases after the same device time: what an eye compares methods by.
+
+Each case gets as many samples a pixel as its measured time of a sample leaves room for. They come
+after those that it was measured with, so the errors of the picture are independent of the mean of
+these, which tells what the picture should be.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from freepath.errors import FreepathError
+from freepath.measure import Bench, shape_of
+from freepath.pictures import EQUAL_TIME, attributes_of, has_picture, picture, stem, write_exr
+
+LOG = "pictures.log"
+"""Within the folder of a run, where something went wrong."""
+VISIBLE = 0.05
+"""Relative RMSE of a pixel of the best case: noise that is seen."""
+SHARE = 0.1
+"""Of the best case's time it was measured in, at most: its mean has to tell what is an error."""
+LEAST_SAMPLES = 4
+"""Of the slowest case: with fewer, times are equal but roughly."""
+
+
+@dataclass(frozen=True, eq=False)
+class Shot:
+    """A measured case that a picture can be made of."""
+
+    row: dict[str, Any]
+    bench: Bench
+    rays: Any
+    """The config's model of them."""
+    unbiased: bool
+    """Whether its mean may serve as a reference."""
+
+
+def seconds_of(rows: Sequence[dict[str, Any]]) -> float:
+    """Device seconds a pixel: the best case's noise is VISIBLE then, if the slowest can start."""
+    least = LEAST_SAMPLES * max(row["time_per_sample_s"] for row in rows)
+    return max(least, min(map(_visible, rows)))
+
+
+def _visible(row: dict[str, Any]) -> float:
+    scale = row["estimate"] if row["reference"] is None else row["reference"]
+    needed = row["variance"] / (VISIBLE * scale) ** 2 if scale else 0.0
+    return row["time_per_sample_s"] * min(needed, SHARE * row["samples_per_ray"])
+
+
+def render(folder: Path, shots: Sequence[Shot]) -> list[str]:
+    """Write a picture of each case of one scene and device; returns what went wrong.
+
+    Raises RunError where a launch fails.
+    """
+    told = []
+    groups: dict[tuple[str, ...], list[Shot]] = {}
+    for shot in shots:
+        if has_picture(shot.rays, shot.row["rays"]):
+            key = tuple(str(shot.row[name]) for name in ("estimand", "light", "scatterings"))
+            groups.setdefault(key, []).append(shot)
+    for group in groups.values():
+        seconds = seconds_of([shot.row for shot in group])
+        told += filter(None, (_render(folder, shot, seconds) for shot in group))
+    return told
+
+
+def _render(folder: Path, shot: Shot, seconds: float) -> str:
+    row, runner, found = shot.row, shot.bench.timed, shot.bench.measurement.moments
+    per_sample = row["time_per_sample_s"]
+    wanted = round(seconds / per_sample)
+    shape = shape_of(wanted, runner.rays, per_sample, runner.lanes_in_all)
+    one = runner.run(found.count, shape.samples, shape.blocks)
+    samples = shape.per_ray
+    resolution = shot.rays.resolution
+    attributes = attributes_of(row) | {
+        "freepath:samples": str(samples),
+        "freepath:time_s": f"{one.time_s / row['rays']:.6g}",
+        "freepath:equal_time_s": f"{seconds:.6g}",
+        "freepath:unbiased": str(int(shot.unbiased)),
+    }
+    base = folder / EQUAL_TIME / stem(row)
+    try:
+        base.parent.mkdir(parents=True, exist_ok=True)
+        error = picture(found.variance / samples, resolution)
+        write_exr(base, picture(one.moments.mean, resolution), error, attributes)
+    except (OSError, FreepathError) as problem:
+        return f"no picture at equal time of {row['case']}: {problem}"
+    return ""

@@ -1,0 +1,109 @@
+"""Pictures at equal time: what a run leaves, and what a report makes of it."""
+
+import base64
+from pathlib import Path
+
+import numpy as np
+import pytest
+from freepath import cli, equal_time, pictures
+from freepath.report import load
+from freepath.report.renders import Render, panels, reference_of, rmse_of
+from freepath.results import read_rows
+
+CONFIG = """\
+name: pictures
+render: true
+rays: {orthographic: {resolution: [16, 8], direction: [0, 0, 1]}}
+matrix:
+  estimand: radiance
+  medium: {cloud: {resolution: 16, sigma_t: 8, albedo: 0.9}}
+  light: {point: {position: [0.3, 0.4, 2], intensity: 10}}
+  scatterings: [1, 2]
+  tracker: delta
+  shadow: [ratio, delta]
+stop: {samples: 2000}
+"""
+
+
+@pytest.fixture
+def result(work, selector):
+    (work / "x.yaml").write_text(CONFIG)
+    assert cli.main(["run", "x.yaml", "-d", selector, "-o", "out"]) == 0
+    return work / "out"
+
+
+def test_a_run_leaves_pictures_whose_noise_is_that_of_their_time(result):
+    rows = read_rows(result / "summary.csv")
+    assert len(rows) == 4
+    for row in rows:
+        paths = [
+            result / f / f"{pictures.stem(row)}.exr" for f in ("pictures/equal-time", "pictures")
+        ]
+        told, short = pictures.read_exr(paths[0])
+        _, long = pictures.read_exr(paths[1])
+        samples = int(told["freepath:samples"])
+        wanted = float(told["freepath:equal_time_s"]) / float(row["time_per_sample_s"])
+        assert samples == pytest.approx(wanted, rel=0.3, abs=2)
+        # independent samples: errors of pixels over their standard deviation have variance 1
+        z = (short["mean"] - long["mean"]) / np.sqrt(short["variance"] + long["variance"])
+        z = z[short["variance"] > 0]
+        assert z.size > 60
+        assert abs((z**2).mean() - 1) < 6 * np.sqrt((z**2).var() / z.size)
+
+
+def test_a_question_is_one_panel_with_errors(result):
+    found = panels(load([result]))
+    assert len(found) == 2  # one scattering and two have different answers
+    for panel in found:
+        assert len(panel["items"]) == 2
+        for item in panel["items"]:
+            assert "shadow" in item["method"]
+            assert 0 < item["rmse"] < 1
+            for name in ("picture", "error"):
+                head, _, data = item[name].partition(",")
+                assert head == "data:image/png;base64"
+                assert base64.b64decode(data).startswith(b"\x89PNG")
+
+
+def test_pictures_that_cannot_be_read_are_left_out(result):
+    broken, *_ = sorted(Path(result / "pictures" / "equal-time").iterdir())
+    broken.write_bytes(b"no picture")
+    assert sum(len(panel["items"]) for panel in panels(load([result]))) == 3
+
+
+def row_of(seconds, variance, samples=10_000):
+    return {
+        "time_per_sample_s": seconds,
+        "variance": variance,
+        "estimate": 1.0,
+        "reference": None,
+        "samples_per_ray": samples,
+    }
+
+
+def test_the_time_is_that_of_the_best_and_starts_the_slowest():
+    assert equal_time.seconds_of([row_of(1e-6, 1.0), row_of(1e-6, 4.0)]) == pytest.approx(4e-4)
+    assert equal_time.seconds_of([row_of(1e-6, 0.0), row_of(1e-3, 1.0)]) == pytest.approx(4e-3)
+    # what it was measured in must know it much better
+    assert equal_time.seconds_of([row_of(1e-6, 1.0, samples=1000)]) == pytest.approx(1e-4)
+
+
+def test_the_reference_trusts_the_unbiased_by_their_precision():
+    random, shape = np.random.default_rng(1), (64, 64, 1)
+
+    def render(value, variance, *, unbiased):
+        long = value + np.sqrt(variance) * random.standard_normal(shape)
+        short = value + 0.3 * random.standard_normal(shape)
+        return Render({}, short, long, np.full(shape, variance), unbiased, 1, 1.0)
+
+    renders = [
+        render(1.0, 0.01, unbiased=True),
+        render(1.0, 1.0, unbiased=True),
+        render(2.0, 1e-6, unbiased=False),
+    ]
+    reference, variance = reference_of(renders)
+    assert variance == pytest.approx(1 / 101)
+    assert reference.mean() == pytest.approx(1.0, abs=0.01)
+    # the noise of the reference is no error of the picture
+    assert rmse_of(renders[0].mean, reference, variance) == pytest.approx(0.3, rel=0.05)
+    assert rmse_of(renders[2].mean, reference, variance) == pytest.approx(1.04, rel=0.05)
