@@ -115,8 +115,7 @@ class Sweep:
             medium = stored.medium.data
             data[key] = KernelData.upload(self.device, scene.segments, medium, case.arithmetic)
         timed, counting = (
-            runner_of(case, job.structure, stored, program, data[key])
-            for program in programs
+            runner_of(case, job.structure, stored, program, data[key]) for program in programs
         )
         samples = limits.samples_of(stop.samples, self.device.info)
         rule = Rule(stop.error, stop.time_noise, stop.at_most, samples)

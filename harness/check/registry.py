@@ -20,6 +20,7 @@ from freepath.check.suite import (
     random_numbers,
     scattering,
     smoke,
+    stored,
     thickness,
 )
 from freepath.errors import NothingMatchedError, UsageError
@@ -37,6 +38,7 @@ SUITE = (
     scattering,
     channels,
     counted,
+    stored,
 )
 
 

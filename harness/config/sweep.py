@@ -76,7 +76,7 @@ class Matrix(Model):
     arithmetic: Arithmetics = ("strict",)
     """strict float, fast (-cl-fast-relaxed-math) or double."""
     storage: Storages = ("float",)
-    """How the voxels of a grid are stored: float, or half (16 bits); other media ignore this axis."""
+    """How the voxels of a grid are stored: float or half; other media ignore this axis."""
 
 
 AXES = tuple(Matrix.model_fields)

@@ -21,8 +21,9 @@ class GridMedium(Medium):
     and its value holds at its centre. `nearest` takes the value of the voxel that a point is in;
     `trilinear` interpolates between the eight centres around it, and is constant beyond the
     outermost centres (clamp to edge). `voxels` is float32 [z, y, x], already scaled; it is the
-    truth for references, and for kernels that read it as float. For `trilinear` an axis of one voxel becomes one of two
-    half as long, so that every point lies between two centres. `name` is what messages call it.
+    truth for references, and for kernels that read it as float. For `trilinear` an axis of one
+    voxel becomes one of two half as long, so that every point lies between two centres. `name` is
+    what messages call it.
     """
 
     offers = frozenset({"cells"})
