@@ -48,6 +48,18 @@ class Scene:
             return self
         return self._keep("few", lambda: Scene(self.medium, few, self.search_path))
 
+    def as_stored(self, case: Case) -> Scene:
+        """The same as the kernel of a case reads it: with the voxels in the case's storage.
+
+        All that must bound or fit what the kernel reads comes from it; references are this one's.
+        Raises VolumeError for voxels that cannot be stored so.
+        """
+        medium = self._keep(("stored", case.storage), lambda: self.medium.stored(case.storage))
+        if medium is self.medium:
+            return self
+        stored = Scene(medium, self.segments, self.search_path)
+        return self._keep(("scene", case.storage), lambda: stored)
+
     def sky(self, case: Case) -> Sky | None:
         """The image that lights a case, in the medium's channels; None where it has none.
 
@@ -161,6 +173,7 @@ def structure_of(
         majorant_numbers=majorants.numbers_of(case.majorant, needs),
         lanes=device.info.lanes if case.lanes == "auto" else int(case.lanes),
         arithmetic=case.arithmetic,
+        storage=case.storage,
         channels=paths.channels if paths else len(medium.channels),
         chromatic=paths.chromatic if paths else chromatic,
         paths=paths,
@@ -194,7 +207,10 @@ def _shadow(case: Case, catalog: Catalog) -> effects.Shadow | None:
 def runner_of(
     case: Case, structure: Structure, scene: Scene, program: Program, data: KernelData
 ) -> Runner:
-    """Bind a built program to the numbers and the majorant of a case."""
+    """Bind a built program to the numbers and the majorant of a case.
+
+    `scene` and `data` are as the case stores them.
+    """
     controlled = "control" in structure.needs
     medium, majorant = scene.medium, scene.majorant(case, controlled=controlled)
     numbers = source.numbers_of(

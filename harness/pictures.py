@@ -38,6 +38,8 @@ ATTRIBUTES = {
     "majorant": "majorant",
     "tracker": "tracker",
     "params": "params",
+    "arithmetic": "arithmetic",
+    "storage": "storage",
     "light": "light",
     "seed": "seed",
     "samples": "samples_per_ray",

@@ -43,6 +43,8 @@ class Case:
     params: Mapping[str, float | int | str] = dataclasses.field(hash=False)
     lanes: int | str
     arithmetic: str
+    storage: str
+    """How the voxels of a grid are stored; float of media that have none."""
     rays: Kind
     seed: int
     stop: Stop
@@ -57,18 +59,24 @@ class Case:
     def identity(self) -> dict[str, Any]:
         """Return everything that defines the case but its place and the device, fit for JSON."""
         paths = {} if self.light is None else self._of_paths()
-        return paths | {
-            "estimand": self.estimand,
-            "medium": self.medium.as_dict(),
-            "majorant": self.majorant.as_dict() if self.majorant else None,
-            "tightness": self.tightness,
-            "tracker": {self.tracker: dict(self.params)},
-            "lanes": self.lanes,
-            "arithmetic": self.arithmetic,
-            "rays": self.rays.as_dict(),
-            "seed": self.seed,
-            "stop": self.stop.model_dump(mode="json"),
-        }
+        # what was always float is known by the same identity as when there was nothing else
+        stored = {} if self.storage == "float" else {"storage": self.storage}
+        return (
+            paths
+            | stored
+            | {
+                "estimand": self.estimand,
+                "medium": self.medium.as_dict(),
+                "majorant": self.majorant.as_dict() if self.majorant else None,
+                "tightness": self.tightness,
+                "tracker": {self.tracker: dict(self.params)},
+                "lanes": self.lanes,
+                "arithmetic": self.arithmetic,
+                "rays": self.rays.as_dict(),
+                "seed": self.seed,
+                "stop": self.stop.model_dump(mode="json"),
+            }
+        )
 
     def _of_paths(self) -> dict[str, Any]:
         return {
@@ -150,6 +158,8 @@ def _points(axes: dict[str, tuple[Any, ...]], catalog: Catalog) -> dict[tuple[An
         trackers = [kind for kind in (point["tracker"], point["shadow"]) if kind]
         if not any("majorant" in catalog.trackers[kind.kind].needs for kind in trackers):
             point["majorant"] = point["tightness"] = None
+        if not point["medium"].VOXELS:
+            point["storage"] = "float"
         points[tuple(point.values())] = point
     return points
 
@@ -205,6 +215,7 @@ def _name(point: Point) -> str:
         parts += [label(point["light"]), f"s{point['scatterings']}"]
         parts += [label(point["shadow"])] if point["shadow"] else []
         parts += ["effects=all"] if point["effects"] == "all" else []
+    parts += [] if point["storage"] == "float" else [f"storage={point['storage']}"]
     lanes = point["lanes"]
     parts += [label(point["tracker"]), lanes if lanes == "auto" else f"l{lanes}"]
     return "/".join([*parts, point["arithmetic"]])

@@ -12,7 +12,7 @@ from typing import Any
 
 from freepath.errors import FreepathError
 
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3
 SUMMARY, SAMPLES, CONFIRM, RUN = "summary.csv", "samples.csv", "confirm.csv", "run.json"
 CHECKS = "checks.json"
 """What became of the checks of a tracker on trial."""
@@ -23,7 +23,8 @@ COLUMNS = (
     "device", "platform", "driver_version",
     "tracker", "estimand", "medium", "channels", "majorant", "tightness", "effects",
     "light", "scatterings", "shadow", "composition",
-    "arithmetic", "lanes", "params", "seed", "rays", "samples_per_ray", "rounds", "stopped",
+    "arithmetic", "storage", "lanes", "params", "seed",
+    "rays", "samples_per_ray", "rounds", "stopped",
     "lookups_per_sample", "crossings_per_sample", "steps_per_sample", "lane_occupancy",
     "time_per_sample_s", "time_per_sample_cv", "time_noise", "timing_source",
     "time_device_s", "time_wall_s", "device_time_share", "time_build_s",
@@ -48,7 +49,7 @@ CONFIRM_COLUMNS = (
 TEXTS = frozenset((
     "run_id", "case_id", "case", "status", "reason", "device", "platform", "driver_version",
     "tracker", "estimand", "medium", "majorant", "effects", "light", "scatterings", "shadow",
-    "composition", "arithmetic", "params", "stopped",
+    "composition", "arithmetic", "storage", "params", "stopped",
     "timing_source", "source_sha256", "config_sha256",
 ))
 # fmt: on

@@ -45,6 +45,7 @@ def base_row(case: Case, device: DeviceInfo, run_id: str) -> dict[str, Any]:
         "shadow": label(case.shadow) if case.shadow else "none",
         "composition": case.effects or "auto",
         "arithmetic": case.arithmetic,
+        "storage": case.storage,
         "lanes": device.lanes if case.lanes == "auto" else case.lanes,
         "params": json.dumps(dict(case.params), sort_keys=True),
         "seed": case.seed,
@@ -72,16 +73,19 @@ def measured_row(
     found: Measurement,
     reference: np.ndarray | None,
     largest_score: float,
+    claimed: np.ndarray | None = None,
 ) -> dict[str, Any]:
     """Fill in what was measured. A row whose numbers cannot be trusted says so in its status.
 
     `reference` is of the shape (rays,) or (rays, channels), None where it is unknown;
-    `largest_score` bounds the scores of unbiased trackers.
+    `largest_score` bounds the scores of unbiased trackers. `claimed` is what these estimate where
+    the medium was rounded to be stored: they are held to it, and the bias is against `reference`.
     """
     with np.errstate(invalid="ignore", over="ignore"):
         result = accuracy(found.moments, reference)
+        held = result if claimed is None else accuracy(found.moments, claimed)
     row = row | _costs(found, row["lanes"])
-    row["status"], row["reason"] = verdict(tracker, row, result, largest_score)
+    row["status"], row["reason"] = verdict(tracker, row, held, largest_score)
     if row["status"] != "invalid":
         row |= _errors(result, found, row)
     return row

@@ -68,7 +68,9 @@ def build_scenes(cases: list[Case], folders: list[Path]) -> dict[str, Scene]:
         key = scene_key(case)
         if key not in scenes:
             scenes[key] = Scene.of(case, build_medium(case.medium, folders), folders)
-        scenes[key].sky(case)  # so that an image that cannot be used is told before anything runs
+        # what cannot be used is told before anything runs
+        scenes[key].sky(case)
+        scenes[key].as_stored(case)
     return scenes
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from freepath import kernel_files
 from freepath.effects import SKY_COLUMNS, SKY_ROWS, Chosen, Effects
@@ -37,6 +37,8 @@ class Structure:
     majorant_numbers: tuple[str, ...]
     lanes: int
     arithmetic: str
+    storage: str = "float"
+    """How the voxels of a grid are stored: float or half."""
     channels: int = 1
     chromatic: bool = False
     """Whether a path has a weight for each channel, be it one; or one weight."""
@@ -82,9 +84,10 @@ def compose(structure: Structure) -> Source:
     channels = kernel_files.read(f"channels/{'several' if structure.chromatic else 'one'}")
     parts.append(_structs(structure, [*walks, channels]))
     middle = [f"estimands/{structure.estimand}", "count/on" if structure.count else "count/off"]
+    middle += ["storage/half"] if structure.storage == "half" else []
     middle += [f"medium/{structure.medium}", "lanes/path"]
-    parts += _named(kernel_files.read(name) for name in middle)
-    parts += _named([channels, *walks])
+    files = [*(kernel_files.read(name) for name in middle), channels, *walks]
+    parts += _named(_as_stored(file, structure) for file in files)
     tracker = KernelFile(f"trackers/{structure.tracker}.cl", structure.tracker_code)
     paths = structure.paths
     exact = structure.arithmetic == "double"
@@ -128,6 +131,18 @@ def _with_uses(names: Iterable[str]) -> list[KernelFile]:
 
 def _named(files: Iterable[KernelFile]) -> list[str]:
     return [f'#line 1 "{file.name}"\n{_without_blank_head(file.code)}' for file in files]
+
+
+def _as_stored(file: KernelFile, structure: Structure) -> KernelFile:
+    """A file as it reads the voxels of a grid in their storage; all that is float is as it stands.
+
+    OpenCL 1.x has no overloaded functions, and a pointer says its type where it is declared.
+    """
+    reads_voxels = file.name.startswith(("medium/", "cells/"))
+    if structure.storage == "float" or not reads_voxels:
+        return file
+    code = re.sub(r"\bgather\(", "gather_half(", file.code)
+    return replace(file, code=code.replace("__global const float *", "__global const half *"))
 
 
 def _without_blank_head(code: str) -> str:
@@ -178,13 +193,15 @@ def _structs(structure: Structure, walks: list[KernelFile]) -> str:
         lines.append(f"typedef struct {{ SCALAR {fields}; }} {_type_of(group)};")
     members = " ".join(f"{_type_of(group)} {group};" for group in groups)
     lines.append(f"typedef struct {{ {members} }} Numbers;")
-    pointers = "__global const float *medium_data; __global const float *majorant_data;"
-    data = "medium_data, majorant_data"
+    stored = "half" if structure.storage == "half" else "float"
+    pointers = f"__global const {stored} *medium_data; __global const float *majorant_data;"
+    medium = "medium_data" if stored == "float" else "(__global const half *)medium_data"
+    data = f"{medium}, majorant_data"
     if _has_sky(structure):
         # in one buffer, so that scenes without an image have no argument for it
         pointers += " __global const float *sky_data;"
         first = "CHANNELS * (SKY_ROWS + 2) * SKY_COLUMNS"
-        data = f"medium_data, majorant_data + {first}, majorant_data"
+        data = f"{medium}, majorant_data + {first}, majorant_data"
     lines.append(f"typedef struct {{ {members} {pointers} }} Scene;")
     values = "".join(f"numbers->{group}, " for group in groups)
     lines += [

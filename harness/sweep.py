@@ -84,7 +84,7 @@ class Sweep:
         tracker = self.catalog.trackers[case.tracker]
         if "control" not in tracker.needs or tracker.bounding is not True:
             return ""
-        excess = scene.majorant(case, controlled=True).control_excess
+        excess = scene.as_stored(case).majorant(case, controlled=True).control_excess
         if excess <= majorants.EXCESS:
             return ""
         share = f"{case.params['share']:g} x {case.params['control']}"
@@ -99,7 +99,7 @@ class Sweep:
             if job.timed is None:
                 self._finish(job, job.row)
         jobs = [job for job in jobs if job.timed is not None]
-        data: dict[str, KernelData] = {}
+        data: dict[tuple[str, str], KernelData] = {}
         for place, job in enumerate(jobs, 1):
             self.on_progress(0.0, f"building {place}/{len(jobs)}")
             try:
@@ -108,17 +108,16 @@ class Sweep:
                 self._fail(job, error)
         self._measure([job for job in jobs if job.bench], scene, seed)
 
-    def _prepare(self, job: Job, scene: Scene, data: dict[str, KernelData]) -> None:
+    def _prepare(self, job: Job, scene: Scene, data: dict[tuple[str, str], KernelData]) -> None:
         case, stop = job.case, job.case.stop
         job.row["time_build_s"] = 0.0
         programs = [self._program(job, text) for text in (job.timed, job.counting)]
-        if case.arithmetic not in data:
-            medium = scene.medium.data
-            uploaded = KernelData.upload(self.device, scene.segments, medium, case.arithmetic)
-            data[case.arithmetic] = uploaded
+        stored, key = scene.as_stored(case), (case.arithmetic, case.storage)
+        if key not in data:
+            medium = stored.medium.data
+            data[key] = KernelData.upload(self.device, scene.segments, medium, case.arithmetic)
         timed, counting = (
-            runner_of(case, job.structure, scene, program, data[case.arithmetic])
-            for program in programs
+            runner_of(case, job.structure, stored, program, data[key]) for program in programs
         )
         samples = limits.samples_of(stop.samples, self.device.info)
         rule = Rule(stop.error, stop.time_noise, stop.at_most, samples, stop.rounds)
@@ -153,7 +152,9 @@ class Sweep:
         by_bench = {job.bench: job for job in jobs}
         self.on_progress(0.0, "computing references")
         for job in jobs:
-            scene.reference(job.case)  # now, and not between two rounds
+            # now, and not between two rounds
+            scene.reference(job.case)
+            scene.as_stored(job.case).reference(job.case)
 
         def on_error(bench: Bench, error: RunError) -> None:
             self._fail(by_bench[bench], error)
@@ -183,9 +184,10 @@ class Sweep:
     def _measured(self, job: Job, scene: Scene) -> None:
         found = job.bench.measurement
         tracker = self.catalog.trackers[job.case.tracker]
-        values = scene.reference(job.case)
-        largest = scene.largest_score(job.case)
-        row = measured_row(job.row, tracker, found, values, largest)
+        values, stored = scene.reference(job.case), scene.as_stored(job.case)
+        largest = stored.largest_score(job.case)
+        claimed = stored.reference(job.case)
+        row = measured_row(job.row, tracker, found, values, largest, claimed)
         if self.render:
             wrong = write_pictures(self.folder.folder, row, job.case.rays, found.moments)
             row["reason"] = "; ".join(filter(None, (row["reason"], wrong)))

@@ -134,8 +134,15 @@ def along(row: Row) -> list[str]:
     return parts + (["all effects"] if row["composition"] == "all" else [])
 
 
+def _lanes(row: Row) -> str:
+    """Lanes, with arithmetic and storage where these are not what they usually are."""
+    unusual = [row["arithmetic"]] if row["arithmetic"] != "strict" else []
+    unusual += [row["storage"]] if row["storage"] not in ("", "float") else []
+    return " ".join([row["lanes"], *unusual])
+
+
 def _cells(row: Row, *, best: bool) -> list[str]:
-    lanes = row["lanes"] if row["arithmetic"] == "strict" else f"{row['lanes']} {row['arithmetic']}"
+    lanes = _lanes(row)
     if row["status"] != "ok":
         status = f"[bold red]{escape(row['status'])}[/]"
         return [escape(_method(row)), lanes, *[""] * 4, status, ""]

@@ -157,6 +157,25 @@ KERNELS = (
         DELTA,
     ),
     Defect(
+        "denormal halves that are flushed to 0",
+        "#define half_at(p, i) vload_half((size_t)(i), p)",
+        "#define half_at(p, i) (vload_half((size_t)(i), p) < 6.1e-5f ? 0.0f : "
+        "vload_half((size_t)(i), p))",
+        f"{HARD}/contrast/half-denormal/ratio",
+    ),
+    Defect(
+        "halves of which every other one is read twice",
+        "#define half_at(p, i) vload_half((size_t)(i), p)",
+        "#define half_at(p, i) vload_half((size_t)(i) & ~(size_t)1, p)",
+        f"{HARD}/contrast/half-rounded/delta",
+    ),
+    Defect(
+        "halves whose exponent is one too small",
+        "#define half_at(p, i) vload_half((size_t)(i), p)",
+        "#define half_at(p, i) (0.5f * vload_half((size_t)(i), p))",
+        f"{HARD}/contrast/half-values/16-lanes",
+    ),
+    Defect(
         "a cubic integrated with a wrong coefficient",
         "(SCALAR)0.5 * cell.c1",
         "(SCALAR)0.45 * cell.c1",

@@ -21,6 +21,7 @@ from freepath.check.suite import (
     random_numbers,
     scattering,
     smoke,
+    stored,
     thickness,
 )
 from freepath.errors import NothingMatchedError, UsageError
@@ -39,6 +40,7 @@ SUITE = (
     near_light,
     channels,
     counted,
+    stored,
 )
 
 

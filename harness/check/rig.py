@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from copy import copy
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -68,6 +68,8 @@ class Flight:
     medium: Medium
     segments: np.ndarray
     """As the kernel reads them: in its precision, so that rounding of input is no error of it."""
+    stored: Medium
+    """The medium as the kernel reads it: with its voxels rounded to what is stored of them."""
     runner: Runner
     recording: bool
     """Whether the kernel writes every sample: then every run must give it the room."""
@@ -83,6 +85,10 @@ class Flight:
         if self.case.light is not None:
             return path_reference(self.case, self.medium, self.segments, self.sky)
         return reference(self.case.estimand, self.medium, self.segments)
+
+    def as_stored(self) -> Flight:
+        """The same, held to the medium as it is stored."""
+        return replace(self, medium=self.stored)
 
     def run(self, samples: int, blocks: int = 1, **options: Any) -> Round:
         """Take samples of every ray, from number 0 on unless `first_sample` says otherwise."""
@@ -112,6 +118,7 @@ class Rig:
         self.folder = folder
         self.seed = seed
         self.arithmetic = "strict"
+        self.storage = "float"
         self._changes: tuple[Change, ...] = ()
         self._programs: dict[str, Program] = {}
         self._media: dict[str, Medium] = {}
@@ -134,6 +141,12 @@ class Rig:
         rig.arithmetic = name
         return rig
 
+    def with_storage(self, name: str) -> Rig:
+        """The same rig with another storage of voxels in flights that do not name theirs."""
+        rig = copy(self)
+        rig.storage = name
+        return rig
+
     def with_change(self, change: Change) -> Rig:
         """The same rig with a defect in each source that has a place for it."""
         rig = copy(self)
@@ -149,7 +162,7 @@ class Rig:
 
     def case(self, *, rays: dict = CHORDS, seed: int | None = None, **axes: Any) -> Case:
         """The one case of a config; media and majorants may be given by their names here."""
-        axes.setdefault("arithmetic", self.arithmetic)
+        axes = {"arithmetic": self.arithmetic, "storage": self.storage} | axes
         axes["medium"] = _named(MEDIA, axes["medium"])
         axes["majorant"] = _named(MAJORANTS, axes.get("majorant", "global"))
         if self.device.info.loop_limit:
@@ -185,11 +198,14 @@ class Rig:
             case, self.catalog, medium, self.device, count=count, record=record
         )
         text = source.compose(structure)
-        data = KernelData.upload(self.device, scene.segments, medium.data, case.arithmetic)
-        runner = binding.runner_of(case, structure, scene, self.program(text), data)
+        stored = scene.as_stored(case)
+        read = stored.medium.data
+        data = KernelData.upload(self.device, scene.segments, read, case.arithmetic)
+        runner = binding.runner_of(case, structure, stored, self.program(text), data)
         read = scene.segments.astype(scalar_type(case.arithmetic)).astype(np.float64)
         tracker = self.catalog.trackers[case.tracker]
-        return Flight(case, tracker, medium, read, runner, record, scene.sky(case))
+        sky = scene.sky(case)
+        return Flight(case, tracker, medium, read, stored.medium, runner, record, sky)
 
     def program(self, text: Source) -> Program:
         """Build a source, each only once."""

@@ -43,6 +43,7 @@ class Options:
     seed: int | None = None
     trackers: Sequence[Path] = ()
     arithmetic: str = "strict"
+    storage: str = "float"
     stop_on_failure: bool = False
     output_on_failure: bool = False
     verbose: bool = False
@@ -69,7 +70,8 @@ class Session:
         ]
         progress = printing.Progress(self.chosen, len(tasks))
         setting = Setting(f"{info.platform} / {info.name} / {info.driver_version}")
-        setting = replace(setting, trackers=tuple(options.trackers), arithmetic=options.arithmetic)
+        setting = replace(setting, trackers=tuple(options.trackers))
+        setting = replace(setting, arithmetic=options.arithmetic, storage=options.storage)
         if options.seed is not None:
             setting = replace(setting, seed=options.seed)
         pool = Pool(

@@ -35,6 +35,8 @@ class Setting:
     seed: int = SEED
     arithmetic: str = "strict"
     """Of kernels, where a check does not say."""
+    storage: str = "float"
+    """Of voxels, where a check does not say."""
 
 
 def serve(connection: Connection, setting: Setting) -> None:
@@ -49,7 +51,7 @@ def serve(connection: Connection, setting: Setting) -> None:
             known = catalog.load(setting.trackers)
             device = open_devices([setting.device] if setting.device else [])[0]
             rig = Rig(device, known, Path(folder), setting.seed)
-            rig = rig.with_arithmetic(setting.arithmetic)
+            rig = rig.with_arithmetic(setting.arithmetic).with_storage(setting.storage)
         except FreepathError as error:
             connection.send(str(error))
             return

@@ -98,6 +98,12 @@ def _add_running(check: Any) -> None:
         help="what kernels are built with where a check does not say; fast: see what it breaks",
     )
     check.add_argument(
+        "--storage",
+        choices=["float", "half"],
+        default="float",
+        help="how voxels are stored where a check does not say; half: see what that breaks",
+    )
+    check.add_argument(
         "--ctest",
         type=Path,
         metavar="DIR",
@@ -164,7 +170,7 @@ def _chosen(options: Namespace) -> list[tuple[int, Check]]:
 def _handed_on(options: Namespace) -> list[str]:
     """The arguments that ctest passes to each check."""
     handed = ["--output-on-failure", "--timeout", f"{options.timeout:g}"]
-    handed += ["--arithmetic", options.arithmetic]
+    handed += ["--arithmetic", options.arithmetic, "--storage", options.storage]
     for device in options.device:
         handed += ["-d", device]
     for folder in options.trackers:
@@ -187,6 +193,7 @@ def _run(options: Namespace, chosen: list[tuple[int, Check]]) -> int:
             seed=options.seed,
             trackers=options.trackers,
             arithmetic=options.arithmetic,
+            storage=options.storage,
             stop_on_failure=options.stop_on_failure,
             output_on_failure=options.output_on_failure,
             verbose=options.verbose,
@@ -253,7 +260,8 @@ def _run_in_processes(options: Namespace, parts: Parts, running: Session) -> lis
 def _for_drivers(options: Namespace) -> list[str]:
     """The arguments that the process of a driver gets, without its devices."""
     arguments = ["-j", str(options.parallel), "--timeout", f"{options.timeout:g}"]
-    arguments += ["--repeat", str(options.repeat), "--arithmetic", options.arithmetic]
+    arguments += ["--repeat", str(options.repeat)]
+    arguments += ["--arithmetic", options.arithmetic, "--storage", options.storage]
     lists = {"-L": options.label_regex, "-LE": options.label_exclude, "--trackers": []}
     lists["--trackers"] = [str(folder.resolve()) for folder in options.trackers]
     lists |= {"-R": [options.tests_regex], "-E": [options.exclude_regex], "--seed": [options.seed]}

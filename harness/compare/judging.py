@@ -16,7 +16,7 @@ VERDICTS = (
 )  # fmt: skip
 REGRESSIONS = ("SLOWER", "MORE_NOISE", "DIFFERENT", "MISSING")
 SMALLEST = np.finfo(float).tiny
-SAMPLE = ("seed", "rays", "driver_version", "lanes", "arithmetic")
+SAMPLE = ("seed", "rays", "driver_version", "lanes", "arithmetic", "storage")
 """Where these are equal, both took the same samples: nothing is left to chance."""
 ROUNDING = 1e-6
 """Relative difference of estimates without variance that different compilers may cause."""

@@ -71,6 +71,8 @@ class Medium(Kind):
     """A medium; OFFERS says what a tracker may ask of it beside sigma_t at a point."""
 
     OFFERS: ClassVar[frozenset[str]] = frozenset()
+    VOXELS: ClassVar[bool] = False
+    """Whether its extinction is stored voxel by voxel."""
     channels: Annotated[tuple[Factor, ...], Several(2, MOST_CHANNELS)] | None = None
     """Extinction of each channel relative to sigma_t, of two or more; grey if left out."""
     albedo: Shares = (0.0,)
@@ -203,6 +205,7 @@ class Cloud(Medium):
 
     kind: ClassVar[str] = "cloud"
     OFFERS: ClassVar[frozenset[str]] = CELLS
+    VOXELS: ClassVar[bool] = True
     resolution: Annotated[int, Number("count", minimum=2, maximum=LARGEST_GRID)]
     """Voxels along each side."""
     seed: Seed = 1
@@ -222,6 +225,7 @@ class Volume(Medium):
 
     kind: ClassVar[str] = "volume"
     OFFERS: ClassVar[frozenset[str]] = CELLS
+    VOXELS: ClassVar[bool] = True
     file: Annotated[str, Text("a file name")]
     """Looked for beside the config, then in $FREEPATH_VOLUMES."""
     sigma_t: Extinction = 1.0

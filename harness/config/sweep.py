@@ -25,6 +25,7 @@ ALONG_PATHS = ("radiance", "path_length")
 UNLIMITED = "unlimited"
 LANES = ("auto", 1, 2, 4, 8, 16)
 ARITHMETIC = ("strict", "fast", "double")
+STORAGE = ("float", "half")
 # the word under which the models of the trackers are handed to a validation as its context
 TRACKER = "tracker"
 
@@ -41,6 +42,7 @@ Scatterings = Annotated[tuple[Annotated[int | str, CountOr(UNLIMITED)], ...], On
 Effects = Annotated[tuple[Annotated[str, Choice(("auto", "all"))], ...], OneOrMore()]
 Lanes = Annotated[tuple[Annotated[int | str, Choice(LANES)], ...], OneOrMore()]
 Arithmetics = Annotated[tuple[Annotated[str, Choice(ARITHMETIC)], ...], OneOrMore()]
+Storages = Annotated[tuple[Annotated[str, Choice(STORAGE)], ...], OneOrMore()]
 
 MediumPattern = Annotated[Kind, OneOf("medium", MEDIA, pattern=True)]
 MajorantPattern = Annotated[Kind, OneOf("majorant", MAJORANTS, pattern=True)]
@@ -73,6 +75,8 @@ class Matrix(Model):
     """Paths that a work-item follows at once; auto is the device's vector width."""
     arithmetic: Arithmetics = ("strict",)
     """strict float, fast (-cl-fast-relaxed-math) or double."""
+    storage: Storages = ("float",)
+    """How the voxels of a grid are stored: float or half; other media ignore this axis."""
 
 
 AXES = tuple(Matrix.model_fields)
@@ -110,6 +114,7 @@ class Include(Entry):
     effects: Effects = Field(None)
     lanes: Lanes = Field(None)
     arithmetic: Arithmetics = Field(None)
+    storage: Storages = Field(None)
 
 
 class Exclude(Entry):
@@ -129,6 +134,7 @@ class Exclude(Entry):
     effects: Effects = Field(None)
     lanes: Lanes = Field(None)
     arithmetic: Arithmetics = Field(None)
+    storage: Storages = Field(None)
 
 
 class Stop(Model):

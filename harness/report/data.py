@@ -121,7 +121,7 @@ def _devices(rows: list[tuple[str, Row]]) -> dict[tuple, str]:
 
 def _variants(rows: list[Row]) -> list[tuple[str, str]]:
     """What cases differ in besides tracker and majorant, as columns with the words for them."""
-    columns = (("lanes", "{} lanes"), ("arithmetic", "{}"))
+    columns = (("lanes", "{} lanes"), ("arithmetic", "{}"), ("storage", "{} storage"))
     return [pair for pair in columns if len({row[pair[0]] for row in rows}) > 1]
 
 
@@ -146,6 +146,7 @@ def _record(row: Row, variants: list[tuple[str, str]], device: str) -> dict[str,
         "x": tightness,
         "lanes": row["lanes"],
         "arithmetic": row["arithmetic"],
+        "storage": row["storage"],
         "status": row["status"],
         "reason": row["reason"],
         "t": number(row, "time_per_sample_s"),

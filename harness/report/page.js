@@ -9,7 +9,7 @@
   let sorted = { column: null, up: true }, place = 0, chosen = [];
 
   for (const row of rows) {
-    row.text = [row.method, row.device, row.q, row.arithmetic, row.lanes + " lanes", row.status].join(" ").toLowerCase();
+    row.text = [row.method, row.device, row.q, row.arithmetic, row.storage, row.lanes + " lanes", row.status].join(" ").toLowerCase();
   }
   const prefixes = [[1e-12, "p"], [1e-9, "n"], [1e-6, "u"], [1e-3, "m"], [1, ""]];
   const seconds = (value) => {
@@ -23,13 +23,14 @@
     `${row.bias < 0 ? "" : "+"}${short(100 * row.bias)}${row.bias_width ? "±" + Number((100 * row.bias_width).toPrecision(2)) : ""}%`;
   const columns = [
     ["case", "method", (row) => row.method, true], ["lanes", "lanes", (row) => row.lanes],
-    ["arithmetic", "arithmetic", (row) => row.arithmetic, true], ["lookups", "lookups", (row) => short(row.lookups)],
+    ["arithmetic", "arithmetic", (row) => row.arithmetic, true],
+    ["storage", "storage", (row) => row.storage, true], ["lookups", "lookups", (row) => short(row.lookups)],
     ["time", "t", (row) => seconds(row.t)], ["occ.", "occupancy", (row) => percent(row.occupancy)],
     ["rel. var.", "v", (row) => short(row.v)], ["bias", "bias", signed],
     ["to 10 %", "t10", (row) => seconds(row.t10)], ["to 1 %", "t1", (row) => seconds(row.t1)],
     ["to 0.1 %", "t01", (row) => seconds(row.t01)], ["medium", "q", (row) => row.q, true],
     ["device", "device", (row) => row.device, true], ["status", "status", (row) => row.status, true],
-  ].filter(([, field]) => !["device", "arithmetic", "q", "status"].includes(field) || new Set(rows.map((row) => row[field])).size > 1);
+  ].filter(([, field]) => !["device", "arithmetic", "storage", "q", "status"].includes(field) || new Set(rows.map((row) => row[field])).size > 1);
 
   const options = (id, field, all) => {
     const values = [...new Set(rows.map((row) => row[field]))];

@@ -59,9 +59,10 @@ def _cloud(model: Any, _: SearchPath) -> Medium:
     densities = cloud(model.resolution, model.seed)
     if model.floor:
         densities = np.float32(model.floor) + np.float32(1 - model.floor) * densities
-    voxels = extinction(densities, model.sigma_t, f"cloud {model.resolution}")
+    name = f"cloud {model.resolution}"
+    voxels = extinction(densities, model.sigma_t, name)
     voxel_size = np.asarray(model.size, dtype=np.float64) / model.resolution
-    return GridMedium(voxels, np.diag([*(1.0 / voxel_size), 0.0])[:3], model.interpolation)
+    return GridMedium(voxels, np.diag([*(1.0 / voxel_size), 0.0])[:3], model.interpolation, name)
 
 
 def _volume(model: Any, search_path: SearchPath) -> Medium:
@@ -71,7 +72,8 @@ def _volume(model: Any, search_path: SearchPath) -> Medium:
         spacing = np.broadcast_to(np.asarray(model.voxel_size, dtype=np.float64), 3)
         to_world = np.diag([*spacing, 0.0])[:3]
     voxels = extinction(volume.densities, model.sigma_t, volume.path)
-    return GridMedium(voxels, _inverse(to_world, volume.path), model.interpolation)
+    name = str(volume.path)
+    return GridMedium(voxels, _inverse(to_world, volume.path), model.interpolation, name)
 
 
 def _inverse(affine: Array, path: Path) -> Array:

@@ -5,11 +5,13 @@ from __future__ import annotations
 from math import comb
 
 import numpy as np
+from freepath.errors import VolumeError
 from freepath.scene.cells import over_ranges, supporting_voxels
 from freepath.scene.medium import Array, Index, Medium, Pieces, crossings, partition
 from numpy.typing import NDArray
 
 AXES = (0, 1, 2)
+LARGEST_HALF = float(np.finfo(np.float16).max)
 
 
 class GridMedium(Medium):
@@ -19,15 +21,19 @@ class GridMedium(Medium):
     and its value holds at its centre. `nearest` takes the value of the voxel that a point is in;
     `trilinear` interpolates between the eight centres around it, and is constant beyond the
     outermost centres (clamp to edge). `voxels` is float32 [z, y, x], already scaled; it is the
-    truth for kernels and reference alike. For `trilinear` an axis of one voxel becomes one of two
-    half as long, so that every point lies between two centres.
+    truth for references, and for kernels that read it as float. For `trilinear` an axis of one
+    voxel becomes one of two half as long, so that every point lies between two centres. `name` is
+    what messages call it.
     """
 
     offers = frozenset({"cells"})
 
-    def __init__(self, voxels: NDArray[np.float32], to_medium: Array, interpolation: str):
+    def __init__(
+        self, voxels: NDArray[np.float32], to_medium: Array, interpolation: str, name: str = "grid"
+    ):
         to_medium = np.array(to_medium, dtype=np.float64)
         self._trilinear = interpolation == "trilinear"
+        self._name = name
         for axis in AXES:
             if self._trilinear and voxels.shape[2 - axis] == 1:
                 voxels = np.repeat(voxels, 2, axis=2 - axis)
@@ -38,6 +44,36 @@ class GridMedium(Medium):
         self._strides = (1, self._shape[0], self._shape[0] * self._shape[1])
         numbers = dict(zip(("nx", "ny", "nz"), self._shape, strict=True))
         super().__init__(self._shape, numbers, to_medium, self.voxels.reshape(-1))
+
+    def stored(self, storage: str) -> Medium:
+        """Return the same grid with each voxel rounded to what is stored of it: float or half.
+
+        Its `data` are float16 then. Raises VolumeError with the first voxel [z, y, x] that is too
+        large for half, and their count.
+        """
+        if storage == "float":
+            return self
+        with np.errstate(over="ignore", under="ignore"):
+            halves = self.voxels.astype(np.float16)
+        self._refuse_infinite(halves)
+        interpolation = "trilinear" if self._trilinear else "nearest"
+        rounded = GridMedium(halves, self.to_medium, interpolation, self._name)
+        rounded.channels, rounded.data = self.channels, halves.reshape(-1)
+        return rounded
+
+    def _refuse_infinite(self, halves: NDArray[np.float16]) -> None:
+        wrong = np.isinf(halves)
+        if not wrong.any():
+            return
+        first = np.argwhere(wrong)[0].tolist()
+        largest = float(self.voxels.max())
+        units = 2.0 ** np.ceil(np.log2(largest / LARGEST_HALF))
+        raise VolumeError(
+            f"{self._name}: {int(wrong.sum())} voxels are too large for storage half, which ends "
+            f"at {LARGEST_HALF:g} (first [z, y, x] = {first}, extinction "
+            f"{self.voxels[tuple(first)]:g}, largest {largest:g}): use storage float, or a unit of "
+            f"length {units:g} times as long (sigma_t / {units:g}, lengths x {units:g})"
+        )
 
     def sigma_t(self, points: Array) -> Array:
         """Return the extinction at points (N, 3) in voxel units, as (N,) float64."""

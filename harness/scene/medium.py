@@ -87,6 +87,13 @@ class Medium(ABC):
     def mean(self) -> float:
         """Return the mean extinction over the box."""
 
+    def stored(self, storage: str) -> Medium:
+        """Return the medium as kernels read it where voxels are stored so; without voxels itself.
+
+        Raises VolumeError where an extinction cannot be stored so.
+        """
+        return self
+
     def chunks(self, segments: Array) -> Iterator[tuple[slice, Pieces]]:
         """Cut many segments into pieces, a few rows at a time."""
         step = max(1, CELLS_PER_CHUNK // self.pieces_per_segment)

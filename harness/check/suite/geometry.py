@@ -198,11 +198,17 @@ def from_afar(rig: Rig, alpha: float, tracker: Tracker) -> None:
     demand(error < 1e-2 * 2.0**-10, f"the same ray from afar is off by {error:.3g}")
 
 
-def contrast(rig: Rig, alpha: float, tracker: Tracker) -> None:
-    """Through a voxel of 10^6, one of a denormal density, and past both."""
+def contrast(
+    rig: Rig,
+    alpha: float,
+    tracker: Tracker,
+    ends: tuple[float, float] = (1e6, 1e-42),
+    **axes: Any,
+) -> None:
+    """Through a voxel of 10^6, one of a denormal density, and past both; or of other `ends`."""
     count = 4
     values = np.zeros((count,) * 3)
-    values[1, 1::2, 2], values[2, 1, :], values[3, 3, :] = 1e6, 1e-42, 1.0
+    values[1, 1::2, 2], values[2, 1, :], values[3, 3, :] = *ends, 1.0
     lines = None
     if not knows_depth(tracker):
         middles = (np.arange(count) + 0.5) / count
@@ -210,7 +216,8 @@ def contrast(rig: Rig, alpha: float, tracker: Tracker) -> None:
         origins = np.column_stack([np.full(count**2, -1.0), y, z])
         lines = origins, np.tile([1.0, 0.0, 0.0], (count**2, 1))
     # the rays of a chord meet the voxel where it is interpolated: few samples, of many lookups
-    flight = voxels(rig, tracker, values, lines=lines, rays=UPWARD, interpolation="nearest")
+    axes |= {"rays": UPWARD, "interpolation": "nearest"}
+    flight = voxels(rig, tracker, values, lines=lines, **axes)
     samples = flight.record(2)
     demand(not samples.round.counters["nonfinite"], "scores are no numbers")
     demand(not samples.round.counters["violations"], "violations of a majorant that bounds")
@@ -219,6 +226,6 @@ def contrast(rig: Rig, alpha: float, tracker: Tracker) -> None:
     expected = flight.reference()
     thick, clear = expected < 1e-30, expected > 0.9999999
     worst = np.abs(samples.score[thick]).max(initial=0.0)
-    demand(worst < 1e-6 or tracker.name not in WITHIN_1, f"{worst:.3g} comes through 10^6")
+    demand(worst < 1e-6 or tracker.name not in WITHIN_1, f"{worst:.3g} comes through {ends[0]:g}")
     lost = np.abs(samples.score[clear] - 1.0).max(initial=0.0)
     demand(lost < 1e-3, f"{lost:.3g} is lost beside it")

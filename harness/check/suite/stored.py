@@ -1,0 +1,108 @@
+"""Voxels stored in half: every value of one, contrasts, and means of what is rounded."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from freepath import kernel_files
+from freepath.catalog import Catalog, Tracker
+from freepath.check.cases import check_samples
+from freepath.check.model import Check
+from freepath.check.parts import Lanes
+from freepath.check.rig import Rig
+from freepath.check.suite.common import VOXELS, everyone, hard, knows_depth, voxels
+from freepath.check.suite.geometry import contrast
+from freepath.check.verdict import demand
+
+GROUP = "contrast"
+LARGEST, SMALLEST = 65504.0, 2.0**-24
+INFINITE = 0x7C00
+"""The bits of infinity: those of every positive finite half are below."""
+DEEP = 2.0**20
+"""Of a cube whose voxels have optical depths of some sixteenths, all are denormal halves."""
+
+
+def checks(catalog: Catalog) -> Iterator[Check]:
+    """Of the group contrast: those of half storage."""
+    for lanes in (1, 16):
+        yield _values(lanes)
+    yield from hard(
+        catalog,
+        (GROUP, "half-million", contrast),
+        in_voxels,
+        "Neighbours of 0, of the largest and of the smallest half are halves exactly: rays through "
+        "one must not see the other, and none is infinite.",
+        ends=(LARGEST, SMALLEST),
+        storage="half",
+    )
+    yield from hard(
+        catalog,
+        (GROUP, "half-denormal", denormal),
+        in_voxels,
+        "Densities that are denormal halves are ordinary numbers once they are read: flushed to 0 "
+        "a thin and large medium vanishes.",
+    )
+    yield from hard(
+        catalog,
+        (GROUP, "half-rounded", rounded),
+        in_voxels,
+        "A density that is rounded up is above a majorant or control of the density as it was: "
+        "these must be of what is stored, and the mean that of the rounded medium.",
+    )
+
+
+def in_voxels(tracker: Tracker) -> bool:
+    """Trackers that fly through voxels."""
+    return everyone(tracker) and not knows_depth(tracker)
+
+
+def _values(lanes: int) -> Check:
+    def run(rig: Rig, alpha: float) -> None:
+        every_value(rig, lanes)
+
+    return Check(
+        f"hard/{GROUP}/half-values/{lanes}-lanes",
+        ("fast", "hard", GROUP),
+        "A conversion of one's own loses the denormal halves, or the largest: all that are finite "
+        "must be read as the same float.",
+        run,
+        kernels=GROUP,
+    )
+
+
+def every_value(rig: Rig, lanes: int) -> None:
+    """In a buffer, as voxels are."""
+    bits = np.arange(INFINITE, dtype=np.uint16)
+    part = Lanes(rig, lanes, more=kernel_files.read("storage/half").code)
+    body = "out0 = gather_half((__global const half *)in0_, as_index(in1));"
+    inputs = [bits.view(np.uint32), np.arange(len(bits), dtype=np.uint32)]
+    (found,) = part(body, inputs, ["real"], len(bits))
+    expected = bits.view(np.float16).astype(np.float32)
+    wrong = np.flatnonzero(found[:, 0] != expected)
+    first = [(hex(i), found[i, 0], expected[i]) for i in wrong[:1]]
+    demand(not wrong.size, f"{wrong.size} of {len(bits)} halves are read wrong, first {first}")
+
+
+def denormal(rig: Rig, alpha: float, tracker: Tracker) -> None:
+    """Multiples of the smallest half: nothing is rounded, so the mean is that of float."""
+    steps = np.ceil(16.0 * VOXELS)
+    flight = voxels(rig, tracker, steps / 16.0, DEEP, storage="half")
+    read = flight.stored.bounds((1, 1, 1))[1].max()
+    demand(0.0 < read < 2.0**-14, f"the largest density is {read:.3g}, expected a denormal half")
+    apart = np.abs(flight.stored.sigma_t(_CENTRES) - flight.medium.sigma_t(_CENTRES)).max()
+    demand(apart == 0.0, f"densities that are halves are rounded by {apart:.3g}")
+    check_samples(flight, flight.record(2048), alpha)
+
+
+_CENTRES = np.stack(np.meshgrid(*[np.arange(len(VOXELS)) + 0.5] * 3), axis=-1).reshape(-1, 3)
+
+
+def rounded(rig: Rig, alpha: float, tracker: Tracker) -> None:
+    """Densities of which half are rounded up, beside empty ones, and each cell's own majorant."""
+    axes = {"storage": "half", "interpolation": "nearest"}
+    flight = voxels(rig, tracker, VOXELS, **axes)
+    upward = flight.stored.sigma_t(_CENTRES) - flight.medium.sigma_t(_CENTRES)
+    demand((upward > 0.0).any() and (upward < 0.0).any(), "no density is rounded either way")
+    flight = flight.as_stored()
+    check_samples(flight, flight.record(2048), alpha)
