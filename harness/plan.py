@@ -61,22 +61,20 @@ class Case:
         paths = {} if self.light is None else self._of_paths()
         # what was always float is known by the same identity as when there was nothing else
         stored = {} if self.storage == "float" else {"storage": self.storage}
-        return (
-            paths
-            | stored
-            | {
-                "estimand": self.estimand,
-                "medium": self.medium.as_dict(),
-                "majorant": self.majorant.as_dict() if self.majorant else None,
-                "tightness": self.tightness,
-                "tracker": {self.tracker: dict(self.params)},
-                "lanes": self.lanes,
-                "arithmetic": self.arithmetic,
-                "rays": self.rays.as_dict(),
-                "seed": self.seed,
-                "stop": self.stop.model_dump(mode="json"),
-            }
-        )
+        return {
+            **paths,
+            **stored,
+            "estimand": self.estimand,
+            "medium": self.medium.as_dict(),
+            "majorant": self.majorant.as_dict() if self.majorant else None,
+            "tightness": self.tightness,
+            "tracker": {self.tracker: dict(self.params)},
+            "lanes": self.lanes,
+            "arithmetic": self.arithmetic,
+            "rays": self.rays.as_dict(),
+            "seed": self.seed,
+            "stop": self.stop.model_dump(mode="json"),
+        }
 
     def _of_paths(self) -> dict[str, Any]:
         return {

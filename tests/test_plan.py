@@ -277,7 +277,7 @@ def test_identity_is_canonical_json(expand):
         "arithmetic": "strict",
         "rays": {"orthographic": {"resolution": [64, 64], "direction": [0.0, 0.0, 1.0]}},
         "seed": 1,
-        "stop": {"error": 0.01, "time_noise": 0.02, "at_most": 10.0, "samples": None},
+        "stop": {"error": 0.01, "time_noise": 0.02, "at_most": 10.0, "samples": None, "rounds": 10},
     }
     assert re.fullmatch("[0-9a-f]{12}", case.case_id)
     assert re.fullmatch("[0-9a-f]{64}", case.config_sha256)
