@@ -133,7 +133,8 @@ Make = Callable[[Path], str]
 
 def _refused(make: Make, name: str) -> Callable[[Rig, float], None]:
     def run(rig: Rig, alpha: float) -> None:
-        path = rig.folder / f"{name}.{'tif' if name == 'not-an-image' else 'npy'}"
+        suffix = name.rpartition("-in-")[2] if "-in-" in name else "npy"
+        path = rig.folder / f"{name}.{'tif' if name == 'not-an-image' else suffix}"
         wanted = make(path)
         medium = {"volume": {"file": str(path), "voxel_size": 0.25}}
         try:
@@ -141,20 +142,36 @@ def _refused(make: Make, name: str) -> Callable[[Rig, float], None]:
         except FreepathError as error:
             text = str(error)
             demand(path.name in text, f"the message does not name the file: {text}")
-            for part in wanted.split(";"):
-                demand(part in text, f"the message lacks '{part}': {text}")
+            demand(wanted in text, f"the message lacks '{wanted}': {text}")
             return
         raise Failure("the volume was taken for a good one")
 
     return run
 
 
-def _wrong_value(value: float) -> Make:
+def _save_slices(path: Path, values: np.ndarray) -> None:
+    """Write an image with a slice along z in each of its parts or pages."""
+    import OpenImageIO as oiio
+
+    specs = [oiio.ImageSpec(*values.shape[:0:-1], 1, oiio.FLOAT) for _ in values]
+    for number, spec in enumerate(specs):
+        spec.attribute("oiio:subimagename", f"slice {number}")
+    output = oiio.ImageOutput.create(str(path))
+    many = output.supports("multiimage") and path.suffix == ".exr"
+    done = output.open(str(path), specs if many else specs[0])
+    for number, plane in enumerate(values):
+        if number:
+            done = done and output.open(str(path), specs[number], "AppendSubimage")
+        done = done and output.write_image(plane[..., None])
+    demand(done and output.close(), f"{path.name} cannot be written: {output.geterror()}")
+
+
+def _wrong_value(value: float, kind: str, save: Callable = np.save) -> Make:
     def make(path: Path) -> str:
         values = np.ones((4, 4, 4), np.float32)
         values[1, 2, 3] = values[3, 3, 3] = value
-        np.save(path, values)
-        return "2"
+        save(path, values)
+        return f"2 {kind} (first [z, y, x] = [1, 2, 3]: {value:g})"
 
     return make
 
@@ -182,9 +199,12 @@ def _truncated(path: Path) -> str:
 
 
 BAD: dict[str, Make] = {
-    "nan": _wrong_value(float("nan")),
-    "infinite": _wrong_value(float("inf")),
-    "negative": _wrong_value(-1.0),
+    "nan": _wrong_value(np.nan, "NaN"),
+    "infinite": _wrong_value(np.inf, "infinite"),
+    "negative": _wrong_value(-1.0, "negative"),
+    "nan-in-exr": _wrong_value(np.nan, "NaN", _save_slices),
+    "negative-in-exr": _wrong_value(-0.25, "negative", _save_slices),
+    "infinite-in-tif": _wrong_value(-np.inf, "infinite", _save_slices),
     "two-axes": _saved(np.ones((4, 4), np.float32)),
     "no-voxels": _saved(np.ones((4, 0, 4), np.float32)),
     "text": _saved(np.full((2, 2, 2), "x")),
