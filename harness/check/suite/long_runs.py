@@ -127,6 +127,23 @@ def cut_launches(rig: Rig, alpha: float) -> None:
     demand(max(seconds) < 1.0, f"a launch took {max(seconds):.2f} s of {sum(seconds):.2f} s")
 
 
+def nonfinite(rig: Rig, alpha: float) -> None:
+    """Weights that overflow in two collisions, and then may be multiplied by 0."""
+    far_above = 2.0**83  # times its inverse it is a majorant of 1, exactly
+    layers = {"breakpoints": [1.5], "values": [far_above, 1.0], "size": [1.0, 1.0, 3.0]}
+    axes = {"medium": {"layered": layers}, "rays": {"orthographic": {"resolution": [8, 8]}}}
+    for lanes in (1, 16):
+        flight = rig.flight(tracker="ratio", tightness=1 / far_above, lanes=lanes, **axes)
+        with np.errstate(invalid="ignore"):
+            samples = flight.record(256)
+        kinds = [np.count_nonzero(test(samples.score)) for test in (np.isinf, np.isnan)]
+        demand(min(kinds) > 0, f"{kinds} scores are infinite, no number: expected some of both")
+        counted, known = samples.round.counters["nonfinite"], sum(kinds)
+        demand(counted == known, f"{counted} counted of {known} scores that are not finite")
+        finite = np.isfinite(samples.round.moments.mean) & ~np.isfinite(samples.score).all(axis=1)
+        demand(not finite.any(), "scores that are not finite are left out of a mean")
+
+
 Make = Callable[[Path], str]
 """Writes a bad file; returns what the message must have beside its name."""
 
@@ -231,6 +248,13 @@ RUNS = {
         "fast",
         "Where all scores are nearly 1, the share of one is less than the last bit of the mean.",
         still_mean,
+    ),
+    "nonfinite": (
+        "accumulation",
+        "fast",
+        "A score that is infinite or no number, if it is dropped or not counted, leaves a mean "
+        "that looks like an answer.",
+        nonfinite,
     ),
     "far-numbers": (
         "long-runs",
