@@ -1,4 +1,4 @@
-"""The test of the tests: defects to plant in the kernels, each with the check that must catch it.
+"""The test of the tests: planted defects, each with the check that must catch it.
 
 `python -m freepath.check.defects [DEVICE [PART]]` plants each whose description has the part, and
 prints the table of docs/defects.md.
@@ -15,6 +15,7 @@ from freepath import catalog
 from freepath.check import registry
 from freepath.check.model import LEVEL, Check
 from freepath.check.planted import KERNELS, Defect
+from freepath.check.planted_host import HOST, HostDefect, planted
 from freepath.check.planted_numbers import NUMBERS
 from freepath.check.planted_paths import PATHS
 from freepath.check.rig import Change, Rig
@@ -22,20 +23,26 @@ from freepath.check.verdict import Failure
 from freepath.device import open_devices
 from freepath.errors import FAILED
 
-DEFECTS = KERNELS + NUMBERS + PATHS
+DEFECTS: tuple[Defect | HostDefect, ...] = KERNELS + NUMBERS + PATHS + HOST
 
 
-def caught(rig: Rig, defect: Defect, check: Check) -> str:
-    """What the check says of the changed kernel; '' where it finds nothing wrong.
+def caught(rig: Rig, defect: Defect | HostDefect, check: Check) -> str:
+    """What the check says of the changed program; '' where it finds nothing wrong.
 
-    Raises LookupError where the check builds no source with a place for the defect.
+    Raises LookupError where the check uses nothing with a place for the defect.
     """
-    change = Change(defect.old, defect.new)
     try:
-        check.run(rig.with_change(change), LEVEL)
+        if isinstance(defect, HostDefect):
+            with planted(defect) as function:
+                check.run(rig, LEVEL)
+            used = function.called
+        else:
+            change = Change(defect.old, defect.new)
+            check.run(rig.with_change(change), LEVEL)
+            used = bool(change.planted)
     except Failure as failure:
         return str(failure)
-    if not change.planted:
+    if not used:
         raise LookupError(f"{check.name} builds nothing with a place for '{defect.what}'")
     return ""
 

@@ -82,6 +82,18 @@ NUMBERS = (
         f"{HARD}/non-bounding/0.5/delta",
     ),
     Defect(
+        "scores that are not finite and not counted",
+        "tally->nonfinite -= ended & ~less(fabs(sum), (real)INFINITY);",
+        "",
+        f"{HARD}/accumulation/nonfinite",
+    ),
+    Defect(
+        "scores that are no number counted only where they are infinite",
+        "~less(fabs(sum), (real)INFINITY);",
+        "equal(fabs(sum), (real)INFINITY);",
+        f"{HARD}/accumulation/nonfinite",
+    ),
+    Defect(
         "paths cut off without being counted",
         "tally->truncated -= truncated;",
         "",

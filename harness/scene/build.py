@@ -71,7 +71,7 @@ def _volume(model: Any, search_path: SearchPath) -> Medium:
     if model.voxel_size is not None:
         spacing = np.broadcast_to(np.asarray(model.voxel_size, dtype=np.float64), 3)
         to_world = np.diag([*spacing, 0.0])[:3]
-    voxels = extinction(volume.densities, model.sigma_t, volume.path)
+    voxels = extinction(volume.densities, model.sigma_t, volume.path, volume.first)
     name = str(volume.path)
     return GridMedium(voxels, _inverse(to_world, volume.path), model.interpolation, name)
 

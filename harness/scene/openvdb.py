@@ -23,12 +23,14 @@ HOW_TO_INSTALL = (
 )
 
 
-def read_openvdb(path: Path, grid: str | None) -> tuple[NDArray, NDArray[np.float64]]:
-    """Return the densities [z, y, x] of a grid's active box and voxels to world (3, 4).
+def read_openvdb(
+    path: Path, grid: str | None
+) -> tuple[NDArray, NDArray[np.float64], tuple[int, int, int]]:
+    """Return the densities of a grid's active box, voxels to world (3, 4), and its first index.
 
-    By OpenImageIO where its build reads OpenVDB; otherwise by Debian's python3-openvdb or
-    python3-openimageio in a process of the system's Python. Raises VolumeError where nothing reads
-    OpenVDB, or where the file or the grid cannot be used.
+    Densities and index are [z, y, x]. By OpenImageIO where its build reads OpenVDB; otherwise by
+    Debian's python3-openvdb or python3-openimageio in a process of the system's Python. Raises
+    VolumeError where nothing reads OpenVDB, or where the file or the grid cannot be used.
     """
     check_complete(path)
     found = _read_here(path, grid)
@@ -41,7 +43,7 @@ def read_openvdb(path: Path, grid: str | None) -> tuple[NDArray, NDArray[np.floa
     # OpenVDB multiplies row vectors; its indices are voxel centres, ours their lower corners
     to_world = matrix[:, :3].T.copy()
     to_world[:, 3] += to_world[:, :3] @ (np.asarray(minimum) - 0.5)
-    return densities, to_world
+    return densities, to_world, tuple(int(i) for i in reversed(minimum))
 
 
 def interpreters() -> list[str]:

@@ -112,7 +112,8 @@ def _checked(path: Path, pixels: Array) -> Array:
         raise VolumeError(f"{path}: has no channel but alpha")
     kinds = {"NaN": np.isnan(pixels), "infinite": np.isinf(pixels), "negative": pixels < 0}
     wrong = [
-        f"{int(where.sum())} {kind} (first {PLACE} = {np.argwhere(where)[0].tolist()})"
+        f"{int(where.sum())} {kind} (first {PLACE} = {np.argwhere(where)[0].tolist()}: "
+        f"{pixels[where][0]:.6g})"
         for kind, where in kinds.items()
         if where.any()
     ]

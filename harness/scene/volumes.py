@@ -24,6 +24,8 @@ class Volume:
     path: Path
     densities: NDArray
     to_world: NDArray[np.float64]
+    first: tuple[int, int, int] = (0, 0, 0)
+    """The index of the first voxel in the file's own count, [z, y, x]."""
 
 
 def read_volume(path: Path, grid: str | None = None) -> Volume:
@@ -33,6 +35,7 @@ def read_volume(path: Path, grid: str | None = None) -> Volume:
     `density`. Raises VolumeError, with the file in its message.
     """
     suffix = path.suffix.lower()
+    first = (0, 0, 0)
     if grid is not None and suffix != ".vdb":
         raise VolumeError(f"{path}: grid {grid!r}: only OpenVDB files have named grids")
     if suffix == ".npy":
@@ -43,21 +46,27 @@ def read_volume(path: Path, grid: str | None = None) -> Volume:
     elif suffix == ".vdb":
         from freepath.scene.openvdb import read_openvdb
 
-        densities, to_world = read_openvdb(path, grid)
+        densities, to_world, first = read_openvdb(path, grid)
     else:
         from freepath.scene.images import read_slices
 
         densities, to_world = read_slices(path)
     if densities.size > MOST_VOXELS:
         raise VolumeError(f"{path}: {densities.size} voxels, expected at most {MOST_VOXELS}")
-    return Volume(path, densities, to_world)
+    return Volume(path, densities, to_world, first)
 
 
-def extinction(densities: NDArray, sigma_t: float, name: str | Path) -> NDArray[np.float32]:
+def extinction(
+    densities: NDArray,
+    sigma_t: float,
+    name: str | Path,
+    first: tuple[int, int, int] = (0, 0, 0),
+) -> NDArray[np.float32]:
     """Return densities [z, y, x] times sigma_t, rounded once to float32.
 
-    Raises VolumeError with the first voxel [z, y, x] and the count of each kind where densities
-    are NaN, infinite or negative, or where a product does not fit into float32.
+    Raises VolumeError with the first voxel, its value and the count of each kind where densities
+    are NaN, infinite or negative, or where a product does not fit into float32. Voxels are named
+    [z, y, x], counted from `first` on.
     """
     result = np.empty(densities.shape, dtype=np.float32)
     largest = float(np.finfo(np.float32).max)
@@ -77,9 +86,11 @@ def extinction(densities: NDArray, sigma_t: float, name: str | Path) -> NDArray[
         }
         for kind, wrong in kinds.items():
             if wrong.any():
-                first = [z, *(int(i) for i in np.argwhere(wrong)[0])]
-                found.setdefault(kind, [0, first])[0] += int(wrong.sum())
+                y, x = (int(i) for i in np.argwhere(wrong)[0])
+                at = [start + i for start, i in zip(first, (z, y, x), strict=True)]
+                place = f"first [z, y, x] = {at}: {values[y, x]:.6g}"
+                found.setdefault(kind, [0, place])[0] += int(wrong.sum())
     if found:
-        parts = [f"{count} {kind} (first [z, y, x] = {at})" for kind, (count, at) in found.items()]
+        parts = [f"{count} {kind} ({place})" for kind, (count, place) in found.items()]
         raise VolumeError(f"{name}: densities that cannot be used: {', '.join(parts)}")
     return result

@@ -16,6 +16,7 @@ from support.derivations import (
     ratio,
     two_knob,
 )
+from support.march_moments import Telescoping, UnbiasedMarch
 
 SAMPLES = 2048
 # Tails too heavy for a sample variance: rays that are thicker, or whose fourth central moment is
@@ -34,19 +35,32 @@ WEIGHTED = [
     ({"weighted_decomposition": {"share": 0.3}}, two_knob(1.0)),
     ({"next_flight_ratio": {}}, lambda along: NextFlight(ratio(along))),
     ("p_series_cmf", Series),
+    ("unbiased_march", UnbiasedMarch),
 ]
+# without a majorant
+MARCHED = [
+    ({"telescoping_march": {"steps": 3, "ratio": 0.1}}, Telescoping),
+    ({"telescoping_march": {"steps": 2, "ratio": 0.3}}, Telescoping),
+    ({"telescoping_march": {"steps": 1, "ratio": 0.2}}, Telescoping),
+]
+TRACK_LENGTH = ({"track_length": {}}, lambda along: TrackLength(delta(along)))
 PLAYED = [
     ("delta", delta),
     ({"weighted_delta": {"probability": "analog"}}, delta),
     ({"decomposition": {}}, delta),
     ({"next_flight_delta": {}}, lambda along: NextFlight(delta(along))),
-    ({"track_length": {}}, lambda along: TrackLength(delta(along))),
+    TRACK_LENGTH,
 ]
+# those whose second moment is no product: on more media
+LAST = [TRACK_LENGTH, WEIGHTED[-1], MARCHED[0]]
 BELOW, BOUNDING = (0.5, 0.8), (1, 1.25, 2, 4, 10)
 CASES = [
     *((*case, "exponential", BELOW + BOUNDING) for case in WEIGHTED),
     *((*case, "exponential", BELOW + BOUNDING) for case in PLAYED),
     *((*case, "trilinear", (1.5,)) for case in WEIGHTED + PLAYED),
+    *((*case, medium, (1,)) for case in MARCHED for medium in ("exponential", "trilinear")),
+    (*TRACK_LENGTH, "homogeneous", BELOW + BOUNDING),
+    *((*case, medium, (1.25,)) for case in LAST for medium in ("linear", "gaussian", "cosine")),
 ]
 # mean, variance and lookups of each
 ALPHA = sidak(1e-3, 3 * sum(len(tightness) for *_, tightness in CASES))
@@ -91,12 +105,11 @@ def test_mean_variance_and_lookups(rig, sigma, tracker, derivation, medium, tigh
     moments = samples.round.moments
     judgeable = Moments(moments.count, moments.mean[rays], moments.m2[rays])
     check_mean(judgeable, expected.moment(1)[rays], ALPHA)
-    if expected.moment(2) is not None:
-        rays &= along.depth <= THICKEST
-        variance = expected.moment(2) - expected.moment(1) ** 2
-        check_variance(samples.score[rays], variance[rays], ALPHA)
+    rays &= along.depth <= THICKEST
+    variance = expected.moment(2) - expected.moment(1) ** 2
+    check_variance(samples.score[rays], variance[rays], ALPHA)
     bias = expected.moment(1) - flight.reference()
-    if tightness >= 1 or (tracker, derivation) in WEIGHTED:
+    if tightness >= 1 or (tracker, derivation) not in PLAYED:
         assert abs(bias).max() < 1e-4  # of the midpoint rule
     else:
         assert samples.round.counters["violations"] > 0
@@ -121,29 +134,6 @@ def test_equal_to_its_relative_sample_for_sample(rig, tracker, relative):
     assert (one.lookups == other.lookups).mean() > 1 - 1e-5
     same = one.lookups == other.lookups
     np.testing.assert_allclose(one.score[same], other.score[same], rtol=1e-4, atol=1e-6)
-
-
-def combs(along):
-    """Teeth of unbiased marching, and the expected number of its combs."""
-    depth = along.integral(along.majorant)
-    teeth = np.ceil(np.cbrt((0.015 + depth) * (0.65 + depth) * (60.3 + depth)))
-    return teeth * (1.0 + 0.45 * np.expm1(2.0))
-
-
-@pytest.mark.parametrize("tightness", BELOW + BOUNDING)
-def test_unbiased_march(rig, sigma, tightness):
-    flight, along = fly(rig, sigma, "unbiased_march", "exponential", tightness)
-    samples = flight.record(SAMPLES)
-    check_mean(samples.round.moments, flight.reference(), ALPHA)
-    check_count(samples.lookups, combs(along), ALPHA)
-
-
-def test_telescoping_march(rig):
-    tracker = {"telescoping_march": {"steps": 3, "ratio": 0.1}}
-    flight = rig.flight(tracker=tracker, medium="exponential", lanes=16)
-    samples = flight.record(SAMPLES)
-    check_mean(samples.round.moments, flight.reference(), ALPHA)
-    check_count(samples.lookups, np.full(len(flight.segments), 3 + 6 * 0.9 / 0.8), ALPHA)
 
 
 @pytest.mark.parametrize("majorant", ["grid", {"octree": {"resolution": 8}}])

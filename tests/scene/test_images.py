@@ -69,7 +69,7 @@ def test_bad_densities_are_found_in_images_too(tmp_path):
     array = DENSITIES.astype(np.float32)
     array[3, 2, 1] = np.nan
     write_slices(tmp_path / "v.exr", array)
-    with pytest.raises(VolumeError, match=r"1 NaN \(first \[z, y, x\] = \[3, 2, 1\]\)"):
+    with pytest.raises(VolumeError, match=r"1 NaN \(first \[z, y, x\] = \[3, 2, 1\]: nan\)"):
         build_medium(volume_model(tmp_path / "v.exr"))
 
 

@@ -83,17 +83,18 @@ def one_reader(request, monkeypatch, tmp_path):
 @pytest.mark.usefixtures("one_reader")
 class TestBothReaders:
     def test_densities_and_transform(self, grids):
-        densities, to_world = openvdb.read_openvdb(grids / "many.vdb", None)
+        densities, to_world, first = openvdb.read_openvdb(grids / "many.vdb", None)
         expected = np.arange(5 * 7 * 9).reshape(5, 7, 9).transpose(2, 1, 0)
         assert densities.tolist() == expected.tolist()
         # the centre of the first voxel is index (-3, 2, 10); i goes along y, j against x
-        first = to_world @ [0.5, 0.5, 0.5, 1.0]
-        assert first.tolist() == [1 - 2 * 0.5, 2 - 3 * 0.25, 3 + 10 * 2]
+        assert first == (10, 2, -3)
+        center = to_world @ [0.5, 0.5, 0.5, 1.0]
+        assert center.tolist() == [1 - 2 * 0.5, 2 - 3 * 0.25, 3 + 10 * 2]
         assert to_world[:, :3].tolist() == [[0, -0.5, 0], [0.25, 0, 0], [0, 0, 2]]
 
     def test_a_grid_by_name_with_constant_tiles(self, grids):
         for file, name in [("many.vdb", "tiles"), ("one.vdb", None)]:
-            densities, _ = openvdb.read_openvdb(grids / file, name)
+            densities, *_ = openvdb.read_openvdb(grids / file, name)
             expected = np.zeros((16, 16, 19))
             expected[:, :, :16] = 2.5
             expected[:2, :2, 17:] = 1.0
@@ -121,6 +122,21 @@ class TestBothReaders:
         assert message in text
         assert text.isprintable()
 
+    def test_a_bad_voxel_is_named_as_in_the_file(self, grids):
+        code = (
+            "import sys, pyopenvdb as vdb\n"
+            "grid = vdb.FloatGrid()\n"
+            "grid.fill((-3, 2, 10), (5, 4, 12), 1.0)\n"
+            "grid.fill((4, 3, 11), (4, 3, 11), -0.25)\n"
+            "vdb.write(sys.argv[1], grids=[grid])"
+        )
+        path = grids / "negative.vdb"
+        assert not run(code, path).returncode
+        with pytest.raises(VolumeError) as error:
+            build_medium(volume_model(path))
+        what = "1 negative (first [z, y, x] = [11, 3, 4]: -0.25)"
+        assert str(error.value) == f"{path}: densities that cannot be used: {what}"
+
     def test_too_many_voxels(self, grids):
         script = Path(openvdb_reader.__file__)
         script.write_text(script.read_text().replace("2**31 - 1", "314"))
@@ -128,7 +144,9 @@ class TestBothReaders:
             openvdb.read_openvdb(grids / "many.vdb", "density")
 
     def test_the_real_cloud_is_its_npy_voxel_for_voxel(self, real_volumes):
-        densities, to_world = openvdb.read_openvdb(real_volumes / "wdas_cloud_sixteenth.vdb", None)
+        densities, to_world, _ = openvdb.read_openvdb(
+            real_volumes / "wdas_cloud_sixteenth.vdb", None
+        )
         expected = np.load(real_volumes / "cloud_wdas16.npy")
         assert densities.dtype == expected.dtype
         assert np.array_equal(densities, expected)

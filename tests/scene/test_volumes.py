@@ -58,17 +58,19 @@ def with_values(**values):
 
 
 REFUSED = {
-    "NaN": (with_values(_012=np.nan, _123=np.nan), "2 NaN (first [z, y, x] = [0, 1, 2])"),
-    "infinite": (with_values(_102=np.inf), "1 infinite (first [z, y, x] = [1, 0, 2])"),
-    "minus infinity": (with_values(_102=-np.inf), "1 infinite (first [z, y, x] = [1, 0, 2])"),
-    "negative": (with_values(_000=-1e-300), "1 negative (first [z, y, x] = [0, 0, 0])"),
+    "NaN": (with_values(_012=np.nan, _123=np.nan), "2 NaN (first [z, y, x] = [0, 1, 2]: nan)"),
+    "infinite": (with_values(_102=np.inf), "1 infinite (first [z, y, x] = [1, 0, 2]: inf)"),
+    "minus infinity": (with_values(_102=-np.inf), "1 infinite (first [z, y, x] = [1, 0, 2]: -inf)"),
+    "negative": (with_values(_000=-1e-300), "1 negative (first [z, y, x] = [0, 0, 0]: -1e-300)"),
     "large": (
         with_values(_121=1e38, _122=2e38),
-        "2 too large for float32 once multiplied by sigma_t = 10 (first [z, y, x] = [1, 2, 1])",
+        "2 too large for float32 once multiplied by sigma_t = 10 "
+        "(first [z, y, x] = [1, 2, 1]: 1e+38)",
     ),
     "all of them": (
         with_values(_123=np.nan, _122=-1, _121=np.inf),
-        "1 infinite (first [z, y, x] = [1, 2, 1]), 1 negative (first [z, y, x] = [1, 2, 2])",
+        "1 infinite (first [z, y, x] = [1, 2, 1]: inf), "
+        "1 negative (first [z, y, x] = [1, 2, 2]: -1)",
     ),
 }
 

@@ -21,17 +21,21 @@ POINTS = 2048  # the error of the midpoint rule is far below that of the samples
 
 
 class AlongRays:
-    """The extinction at the points; a majorant and a control, one for the whole medium."""
+    """The extinction at the points; majorant and control of the whole medium, 0 without."""
 
     def __init__(self, flight: Flight, sigma: Array | None = None):
+        self.flight = flight
         self.step = flight.segments[:, 6:] / POINTS
         self.sigma = extinction(flight.medium, flight.segments) if sigma is None else sigma
         case = flight.case
         control = case.params if "control" in flight.tracker.needs else None
-        bounds = flight.medium.bounds((1, 1, 1))
-        built = majorants.build(case.majorant, flight.medium, bounds, case.tightness, control)
-        self.majorant = built.numbers.get("sigma_t", built.numbers.get("residual"))
-        self.control = built.numbers.get("control", 0.0)
+        numbers = {"sigma_t": 0.0}
+        if case.majorant is not None:
+            bounds = flight.medium.bounds((1, 1, 1))
+            built = majorants.build(case.majorant, flight.medium, bounds, case.tightness, control)
+            numbers = built.numbers
+        self.majorant = numbers.get("sigma_t", numbers.get("residual"))
+        self.control = numbers.get("control", 0.0)
         self.residual = self.sigma - self.control
 
     def integral(self, values: Array) -> Array:
@@ -42,6 +46,12 @@ class AlongRays:
         pieces = np.broadcast_to(values, self.sigma.shape) * self.step
         return np.cumsum(pieces, axis=1) - 0.5 * pieces
 
+    def ahead(self, rate: Array, values: Array) -> Array:
+        """The integral from each point on, what lies ahead attenuated at a rate up to there."""
+        attenuation = np.exp(-self.up_to(rate))
+        pieces = attenuation * values * self.step
+        return (np.cumsum(pieces[:, ::-1], axis=1)[:, ::-1] - 0.5 * pieces) / attenuation
+
     @cached_property
     def depth(self) -> Array:
         return self.integral(self.sigma)
@@ -51,9 +61,11 @@ class AlongRays:
         return np.exp(-self.depth)
 
 
-def extinction(medium: Medium, segments: Array) -> Array:
-    """The extinction (1/world length) at the points of each ray."""
-    t = (np.arange(POINTS) + 0.5) * segments[:, 6:] / POINTS
+def extinction(medium: Medium, segments: Array, fractions: Array | None = None) -> Array:
+    """The extinction (1/world length) at the points of each ray, or at fractions of its length."""
+    if fractions is None:
+        fractions = (np.arange(POINTS) + 0.5) / POINTS
+    t = fractions * segments[:, 6:]
     points = segments[:, None, :3] + t[..., None] * segments[:, None, 3:6]
     return medium.sigma_t(points.reshape(-1, 3)).reshape(t.shape)
 
@@ -140,11 +152,26 @@ class TrackLength:
 
     chain: Chain
 
-    def moment(self, power: int) -> Array | None:
-        """The first; None for the second, which is not derived."""
+    def moment(self, power: int) -> Array:
+        """The first or second."""
         along, chain = self.chain.along, self.chain
         alive = np.exp(-along.up_to(chain._rate(1)))
-        return 1.0 - along.integral(along.sigma * alive) if power == 1 else None
+        lost = along.integral(along.sigma * alive)
+        if power == 1:
+            return 1.0 - lost
+        return 1.0 - 2.0 * lost + along.integral(alive * (self.alone() + self.paired()))
+
+    def alone(self) -> Array:
+        """Squares of single segments."""
+        along = self.chain.along
+        majorant, sigma = along.majorant, along.sigma
+        return sigma**2 * along.ahead(majorant, 1.0) + along.ahead(majorant, sigma**2)
+
+    def paired(self) -> Array:
+        """Twice a segment's estimate times those of all later ones."""
+        along, chain = self.chain.along, self.chain
+        later = along.majorant * chain.survival * along.ahead(chain._rate(1), along.sigma)
+        return 2.0 * along.sigma * along.ahead(along.majorant, later)
 
     def lookups(self) -> Array:
         return 2.0 * self.chain.lookups() + self.chain.moment(0)

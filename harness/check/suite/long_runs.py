@@ -127,13 +127,31 @@ def cut_launches(rig: Rig, alpha: float) -> None:
     demand(max(seconds) < 1.0, f"a launch took {max(seconds):.2f} s of {sum(seconds):.2f} s")
 
 
+def nonfinite(rig: Rig, alpha: float) -> None:
+    """Weights that overflow in two collisions, and then may be multiplied by 0."""
+    far_above = 2.0**83  # times its inverse it is a majorant of 1, exactly
+    layers = {"breakpoints": [1.5], "values": [far_above, 1.0], "size": [1.0, 1.0, 3.0]}
+    axes = {"medium": {"layered": layers}, "rays": {"orthographic": {"resolution": [8, 8]}}}
+    for lanes in (1, 16):
+        flight = rig.flight(tracker="ratio", tightness=1 / far_above, lanes=lanes, **axes)
+        with np.errstate(invalid="ignore"):
+            samples = flight.record(256)
+        kinds = [np.count_nonzero(test(samples.score)) for test in (np.isinf, np.isnan)]
+        demand(min(kinds) > 0, f"{kinds} scores are infinite, no number: expected some of both")
+        counted, known = samples.round.counters["nonfinite"], sum(kinds)
+        demand(counted == known, f"{counted} counted of {known} scores that are not finite")
+        finite = np.isfinite(samples.round.moments.mean) & ~np.isfinite(samples.score).all(axis=1)
+        demand(not finite.any(), "scores that are not finite are left out of a mean")
+
+
 Make = Callable[[Path], str]
 """Writes a bad file; returns what the message must have beside its name."""
 
 
 def _refused(make: Make, name: str) -> Callable[[Rig, float], None]:
     def run(rig: Rig, alpha: float) -> None:
-        path = rig.folder / f"{name}.{'tif' if name == 'not-an-image' else 'npy'}"
+        suffix = name.rpartition("-in-")[2] if "-in-" in name else "npy"
+        path = rig.folder / f"{name}.{'tif' if name == 'not-an-image' else suffix}"
         wanted = make(path)
         medium = {"volume": {"file": str(path), "voxel_size": 0.25}}
         try:
@@ -141,20 +159,36 @@ def _refused(make: Make, name: str) -> Callable[[Rig, float], None]:
         except FreepathError as error:
             text = str(error)
             demand(path.name in text, f"the message does not name the file: {text}")
-            for part in wanted.split(";"):
-                demand(part in text, f"the message lacks '{part}': {text}")
+            demand(wanted in text, f"the message lacks '{wanted}': {text}")
             return
         raise Failure("the volume was taken for a good one")
 
     return run
 
 
-def _wrong_value(value: float) -> Make:
+def _save_slices(path: Path, values: np.ndarray) -> None:
+    """Write an image with a slice along z in each of its parts or pages."""
+    import OpenImageIO as oiio
+
+    specs = [oiio.ImageSpec(*values.shape[:0:-1], 1, oiio.FLOAT) for _ in values]
+    for number, spec in enumerate(specs):
+        spec.attribute("oiio:subimagename", f"slice {number}")
+    output = oiio.ImageOutput.create(str(path))
+    many = output.supports("multiimage") and path.suffix == ".exr"
+    done = output.open(str(path), specs if many else specs[0])
+    for number, plane in enumerate(values):
+        if number:
+            done = done and output.open(str(path), specs[number], "AppendSubimage")
+        done = done and output.write_image(plane[..., None])
+    demand(done and output.close(), f"{path.name} cannot be written: {output.geterror()}")
+
+
+def _wrong_value(value: float, kind: str, save: Callable = np.save) -> Make:
     def make(path: Path) -> str:
         values = np.ones((4, 4, 4), np.float32)
         values[1, 2, 3] = values[3, 3, 3] = value
-        np.save(path, values)
-        return "2"
+        save(path, values)
+        return f"2 {kind} (first [z, y, x] = [1, 2, 3]: {value:g})"
 
     return make
 
@@ -182,9 +216,12 @@ def _truncated(path: Path) -> str:
 
 
 BAD: dict[str, Make] = {
-    "nan": _wrong_value(float("nan")),
-    "infinite": _wrong_value(float("inf")),
-    "negative": _wrong_value(-1.0),
+    "nan": _wrong_value(np.nan, "NaN"),
+    "infinite": _wrong_value(np.inf, "infinite"),
+    "negative": _wrong_value(-1.0, "negative"),
+    "nan-in-exr": _wrong_value(np.nan, "NaN", _save_slices),
+    "negative-in-exr": _wrong_value(-0.25, "negative", _save_slices),
+    "infinite-in-tif": _wrong_value(-np.inf, "infinite", _save_slices),
     "two-axes": _saved(np.ones((4, 4), np.float32)),
     "no-voxels": _saved(np.ones((4, 0, 4), np.float32)),
     "text": _saved(np.full((2, 2, 2), "x")),
@@ -211,6 +248,13 @@ RUNS = {
         "fast",
         "Where all scores are nearly 1, the share of one is less than the last bit of the mean.",
         still_mean,
+    ),
+    "nonfinite": (
+        "accumulation",
+        "fast",
+        "A score that is infinite or no number, if it is dropped or not counted, leaves a mean "
+        "that looks like an answer.",
+        nonfinite,
     ),
     "far-numbers": (
         "long-runs",
