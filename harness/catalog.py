@@ -128,6 +128,7 @@ class FrontMatter(Model):
     bounding: Annotated[bool | dict[str, tuple[Any, ...]], Bounding()] = False
     escapes: Annotated[bool, Flag()] = True
     single_flight: Annotated[bool | dict[str, tuple[Any, ...]], Bounding()] = False
+    shares_lookup: Annotated[bool, Flag()] = False
     unbiased: Annotated[bool, Flag()] = True
     parameters: dict[str, Parameter] = {}
     uses: Annotated[tuple[Annotated[str, Choice(USES)], ...], OneOrMore(optional=True)] = ()
@@ -169,6 +170,9 @@ class Tracker:
     """Whether a flight may leave the medium: one that never does meets no environment."""
     single_flight: bool | dict[str, tuple[Any, ...]]
     """Whether, or for which choices, what it scores on its way is for no path that goes on."""
+    shares_lookup: bool
+    """Whether a step is a tentative collision, a lookup there, and changes there only: lanes on
+    paths and on shadow rays may share both."""
     unbiased: bool
     parameters: dict[str, Parameter]
     state: dict[str, str]
@@ -260,6 +264,7 @@ def read(file: Path) -> Tracker:
         bounding=front.bounding,
         escapes=front.escapes,
         single_flight=front.single_flight,
+        shares_lookup=front.shares_lookup,
         unbiased=front.unbiased,
         parameters=front.parameters,
         state=front.state,

@@ -1,7 +1,9 @@
 """Paths that scatter: what does not change a sample. The checks of the group scattering do more."""
 
 import numpy as np
+from freepath import runner
 from freepath.check.identities import check_mean
+from freepath.check.rig import Change
 
 GRID = {"cloud": {"resolution": 16, "interpolation": "trilinear"}}
 POINT = {"point": {"position": [0.3, 0.4, 2.0], "intensity": 10}}
@@ -32,6 +34,20 @@ def test_a_sample_is_the_same_in_any_number_of_lanes(rig):
     ]
     same = np.isclose(*scores, rtol=1e-3, atol=1e-6)
     assert same.mean() > 0.999
+
+
+def test_a_path_cut_off_on_a_shadow_ray_leaves_the_next_its_ray(rig, monkeypatch):
+    """Samples of a unit, one after the other, are those that are taken one a unit."""
+    monkeypatch.setattr(runner, "STEP_CAP", 6)
+    short = rig
+    for name in ("MOST_STEPS", "SHADOW_STEPS"):
+        short = short.with_change(Change(f"#define {name} (1 << 20)", f"#define {name} 6"))
+    medium = {"cloud": GRID["cloud"] | {"sigma_t": 10, "albedo": 0.9, "g": 0.3}}
+    flight = radiance(short, medium, light=POINT, majorant="grid")
+    assert "shadow_mode.cl" in flight.runner.program.source.text
+    together, apart = flight.record(64), flight.record(1, blocks=64)
+    assert together.round.counters["truncated"] > 100
+    np.testing.assert_array_equal(together.score, apart.score)
 
 
 def test_a_tracker_of_shadow_rays_brings_the_mathematics_that_it_uses(rig):
