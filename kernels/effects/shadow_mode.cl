@@ -14,6 +14,7 @@ state:
   held_direction_z: real
   held_length: real
   held_t: real
+  held_rng: bits[4]
 ---*/
 /* A lane that collides flies a shadow ray next, and then goes on where it was: no other lane waits for it, and a
    step's lookup serves the lanes of both modes. */
@@ -42,8 +43,10 @@ static void flight_step(Path *path, const Scene *scene, Rng *rng)
     Rng drawn = *rng; /* a lane that waits draws no numbers */
     const mask here = next_tentative(path, scene, &drawn);
     const real sigma = sigma_t_at_tentative(path, scene, here);
+    Rng apart = drawn;
     path_step(path, scene, &drawn, here & ~state->shadow, sigma);
-    shadow_step(path, scene, &drawn, here & state->shadow, sigma);
+    shadow_step(path, scene, &apart, here & state->shadow, sigma);
+    merge_rng(&drawn, &apart, state->shadow);
     merge_rng(rng, &drawn, flying);
     /* who leaves has nothing to wait for, and who is cut off no time */
     const mask hurry = (path->escaped & ~state->shadow) | ~less(path->steps, (index)SHADOW_STEPS);
@@ -51,6 +54,17 @@ static void flight_step(Path *path, const Scene *scene, Rng *rng)
     const mask enough = lane_count(ended) >= TOGETHER || !any_lane(path->live) ? (mask)-1 : (mask)0;
     state->waiting = ended & ~enough;
     path->live |= state->waiting;
+}
+
+/* What lanes `where` draw next on their paths; a shadow ray has a stream of its own. */
+static void hold_rng(Path *path, const Rng *rng, const mask where)
+{
+    bits *held = path->state.held_rng;
+    const bits_mask narrow = narrow_mask(where);
+    held[0] = choose(narrow, rng->s0, held[0]);
+    held[1] = choose(narrow, rng->s1, held[1]);
+    held[2] = choose(narrow, rng->s2, held[2]);
+    held[3] = choose(narrow, rng->s3, held[3]);
 }
 
 /* Lanes `where` take over what a ray is and what flies on it. */
@@ -125,10 +139,11 @@ static void begin_shadow(Path *path, const Scene *scene, Rng *rng, const mask he
     if (!any_lane(lit))
         return;
     hold_path(path, lit);
+    hold_rng(path, rng, lit);
     Path shadow = *path;
     shadow.state.worth = face_light(path, scene, &shadow, lit);
     shadow.state.shadow = (mask)-1;
-    Rng shadow_rng = *rng;
+    Rng shadow_rng = companion(rng);
     shadow_begin(&shadow, scene, &shadow_rng);
     take_over(path, &shadow, lit);
     merge_rng(rng, &shadow_rng, lit);
@@ -143,11 +158,12 @@ static void end_shadow(Path *path, const Scene *scene, Rng *rng, const mask seen
     const Path shadow = *path;
     resume_path(path, seen);
     for (int c = 0; c < CHANNELS; ++c) {
-        const real light = shadow.state.worth * transmittance_of_shadow(&shadow, c);
+        const real light = transmittance_of_shadow(&shadow, c);
         const SCALAR power = scene->optics.albedo[c] * scene->light.intensity[c];
-        collect(path, c, weight_of(path, c) * light * power, seen);
+        collect(path, c, weight_of(path, c) * shadow.state.worth * light * power, seen);
     }
-    Rng next = *rng; /* others at an end draw no numbers here */
+    const bits *held = path->state.held_rng;
+    Rng next = {held[0], held[1], held[2], held[3]};
     scatter(path, scene, &next, seen);
     merge_rng(rng, &next, seen);
 }

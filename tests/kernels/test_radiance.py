@@ -1,7 +1,8 @@
 """Paths that scatter: what does not change a sample. The checks of the group scattering do more."""
 
 import numpy as np
-from freepath import runner
+import pytest
+from freepath import effects, runner
 from freepath.check.identities import check_mean
 from freepath.check.rig import Change
 
@@ -34,6 +35,21 @@ def test_a_sample_is_the_same_in_any_number_of_lanes(rig):
     ]
     same = np.isclose(*scores, rtol=1e-3, atol=1e-6)
     assert same.mean() > 0.999
+
+
+@pytest.mark.parametrize("shadow", ["ratio", "delta", "next_flight_ratio"])
+def test_lanes_with_a_mode_give_the_samples_of_an_inner_loop(rig, monkeypatch, shadow):
+    medium = {"cloud": GRID["cloud"] | {"sigma_t": 10, "albedo": 0.9, "g": 0.3}}
+    axes = {"light": POINT, "majorant": "grid", "shadow": shadow}
+    modes = radiance(rig, medium, **axes)
+    monkeypatch.setattr(effects, "DEAR_LOOKUPS", ())
+    loop = radiance(rig, medium, **axes)
+    found = ["shadow_mode.cl" in one.runner.program.source.text for one in (modes, loop)]
+    assert found == [True, False]
+    one, other = modes.record(64), loop.record(64)
+    same = np.isclose(one.score, other.score, rtol=1e-3, atol=1e-6)
+    assert same.mean() > 0.999
+    assert abs(one.lookups.sum() / other.lookups.sum() - 1) < 1e-3
 
 
 def test_a_path_cut_off_on_a_shadow_ray_leaves_the_next_its_ray(rig, monkeypatch):
