@@ -37,17 +37,30 @@ def test_a_sample_is_the_same_in_any_number_of_lanes(rig):
     assert same.mean() > 0.999
 
 
-@pytest.mark.parametrize("shadow", ["ratio", "delta", "next_flight_ratio"])
-def test_lanes_with_a_mode_give_the_samples_of_an_inner_loop(rig, monkeypatch, shadow):
+@pytest.mark.parametrize(
+    ("tracker", "shadow", "arithmetic"),
+    [
+        ("delta", "ratio", "strict"),
+        ("delta", "delta", "double"),
+        ("weighted_delta", "next_flight_ratio", "strict"),
+        ("spectral", "spectral_ratio", "strict"),
+    ],
+)
+def test_lanes_with_a_mode_give_the_samples_of_an_inner_loop(
+    rig, monkeypatch, tracker, shadow, arithmetic
+):
     medium = {"cloud": GRID["cloud"] | {"sigma_t": 10, "albedo": 0.9, "g": 0.3}}
-    axes = {"light": POINT, "majorant": "grid", "shadow": shadow}
+    if tracker == "spectral":
+        medium["cloud"] |= {"channels": [1, 0.5, 0.2], "albedo": [0.9, 0.5, 0.7]}
+    axes = {"light": POINT, "majorant": "grid", "shadow": shadow, "tracker": tracker}
+    axes["arithmetic"] = arithmetic
     modes = radiance(rig, medium, **axes)
     monkeypatch.setattr(effects, "DEAR_LOOKUPS", ())
     loop = radiance(rig, medium, **axes)
     found = ["shadow_mode.cl" in one.runner.program.source.text for one in (modes, loop)]
     assert found == [True, False]
     one, other = modes.record(64), loop.record(64)
-    same = np.isclose(one.score, other.score, rtol=1e-3, atol=1e-6)
+    same = np.isclose(one.scores, other.scores, rtol=1e-3, atol=1e-6)
     assert same.mean() > 0.999
     assert abs(one.lookups.sum() / other.lookups.sum() - 1) < 1e-3
 

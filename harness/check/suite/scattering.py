@@ -43,7 +43,7 @@ SHADOWS = (
 )  # fmt: skip
 SHARING = (
     ("delta", "ratio"), ("weighted_delta", "next_flight_ratio"), ("two_knob", "next_flight_delta"),
-    ("delta", "delta"), ("delta", "split"),
+    ("delta", "delta"), ("delta", "split"), ("spectral", "spectral_ratio"),
 )  # fmt: skip
 """Pairs of which lanes on paths and on shadow rays share a lookup, where there is one to share."""
 EMITTED = ("delta", "analytic", "regular", "weighted_delta", "two_knob")
