@@ -30,4 +30,6 @@ kernel.set_args(out)
 cl.enqueue_nd_range_kernel(queue, kernel, (1,), (1,)).wait()
 found = np.empty(2, np.uint32)
 cl.enqueue_copy(queue, found, out)
-print(f"{devices[0].platform.name} {devices[0].driver_version}: {wanted}: {found[0]}, expected {right}")
+print(
+    f"{devices[0].platform.name} {devices[0].driver_version}: {wanted}: {found[0]}, expected {right}"
+)

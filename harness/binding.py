@@ -148,10 +148,12 @@ def structure_of(
     chromatic = tracker.channels == ANY
     paths = None
     if case.light is not None:
+        shadow_tracker = catalog.trackers[case.shadow.kind] if case.shadow else None
         paths = effects.of_scene(
             case,
             medium,
             _shadow(case, catalog),
+            shares=bool(shadow_tracker and tracker.shares_lookup and shadow_tracker.shares_lookup),
             chromatic=chromatic,
             near_light="light" in tracker.needs,
             aims=tracker.aims,

@@ -129,6 +129,7 @@ class FrontMatter(Model):
     escapes: Annotated[bool, Flag()] = True
     aims: Annotated[bool, Flag()] = False
     single_flight: Annotated[bool | dict[str, tuple[Any, ...]], Bounding()] = False
+    shares_lookup: Annotated[bool, Flag()] = False
     unbiased: Annotated[bool, Flag()] = True
     parameters: dict[str, Parameter] = {}
     uses: Annotated[tuple[Annotated[str, Choice(USES)], ...], OneOrMore(optional=True)] = ()
@@ -172,6 +173,9 @@ class Tracker:
     """Whether directions are chosen with the light in mind too, by effects/aimed_direction."""
     single_flight: bool | dict[str, tuple[Any, ...]]
     """Whether, or for which choices, what it scores on its way is for no path that goes on."""
+    shares_lookup: bool
+    """Whether a step is a tentative collision, a lookup there, and changes there only: lanes on
+    paths and on shadow rays may share both."""
     unbiased: bool
     parameters: dict[str, Parameter]
     state: dict[str, str]
@@ -264,6 +268,7 @@ def read(file: Path) -> Tracker:
         escapes=front.escapes,
         aims=front.aims,
         single_flight=front.single_flight,
+        shares_lookup=front.shares_lookup,
         unbiased=front.unbiased,
         parameters=front.parameters,
         state=front.state,

@@ -19,6 +19,10 @@ Chosen = tuple[str, str, tuple[str, ...]]
 SKY_ROWS, SKY_COLUMNS = 64, 128
 """Of the table that an image of the environment is resampled to, without the rows beyond poles."""
 
+DEAR_LOOKUPS = ("grid_nearest", "grid_trilinear")
+"""Media of which a lookup costs so much that lanes on shadow rays and on paths should share it:
+docs/decisions/shadow-rays.md."""
+
 
 @dataclass(frozen=True)
 class Shadow:
@@ -46,6 +50,8 @@ class Effects:
     aims: bool = False
     """Whether it chooses directions so too."""
     shadow: Shadow | None = None
+    modes: bool = False
+    """Whether a lane is on its path or on a shadow ray; else these are flown in an inner loop."""
     values: Mapping[str, Mapping[str, Any]] = field(default_factory=dict, hash=False)
     """{group: {field of the kernel's Numbers: value or list of values}}, in their order."""
 
@@ -92,10 +98,12 @@ class Effects:
             before += ["effects/angle_table"] if self.aims and self.phase != "isotropic" else []
             limited = "roulette" if "roulette" in self else "no_roulette"
             before.append(f"effects/{limited}")
-        files = [kernel_files.read(name) for name in [*before, "effects/flight_names"]]
+        names = "effects/mode_names" if self.modes else "effects/flight_names"
+        files = [kernel_files.read(name) for name in [*before, names]]
         files.append(tracker)
         if self.shadow:
             files.append(kernel_files.read("effects/shadow_names"))
+            files += [kernel_files.read("effects/shadow_mode_names")] if self.modes else []
             files.append(KernelFile(f"trackers/{self.shadow.name}.cl", self.shadow.code))
         after = [kernel_files.read(name) for name in ("effects/own_names", *self._after)]
         return [
@@ -109,67 +117,89 @@ class Effects:
     def _after(self) -> list[str]:
         order = ("length", "emission", "environment", "environment_image")
         order += ("point_light", "scattering")
-        files = [f"effects/{name}" for name in order if name in self]
+        after = [f"effects/{name}" for name in order if name in self]
         if "scattering" in self:
             direction = "aimed_direction" if self.aims else "new_direction"
-            files[-1:-1] = ["effects/around", f"effects/{direction}"]
-        return files
+            after[-1:-1] = ["effects/around", f"effects/{direction}", f"effects/{self._until}"]
+        if self.modes:
+            after.append("effects/shadow_mode")
+        elif "point_light" in self:
+            after.append("effects/shadow_loop")
+        return after
 
     @property
-    def _going_on(self) -> str:
-        """The lanes that scatter: behind the last light of a point there must be something else."""
-        if any(name in self for name in ("length", "emission", "environment", "environment_image")):
-            return "here"
-        most = "(index)(INTEGER)scene->optics.scatterings"
-        return f"here & less(path->state.scatterings + 1, {most})"
+    def _until(self) -> str:
+        """Where a path ends: behind the last light of a point there must be something else."""
+        beyond = ("length", "emission", "environment", "environment_image")
+        return "until_out" if any(name in self for name in beyond) else "until_last_light"
 
     def _hooks(self) -> str:
         """What happens at the beginning of a path and at the end of a flight."""
-        at_end = ["collect_length(path, ended);"] if "length" in self else []
-        if "environment" in self:
-            at_end.append("see_environment(path, scene, ended & path->escaped);")
-        if "environment_image" in self:
-            at_end.append("see_image(path, scene, ended & path->escaped);")
-        at_end += [
-            "const mask here = ended & ~path->escaped;",
-            "if (!any_lane(here))",
-            "    return;",
-        ]
-        calls = {
-            "emission": "emit(path, scene, here);",
-            "point_light": "light_directly(path, scene, rng, here);",
-            "scattering": f"scatter(path, scene, rng, {self._going_on});",
-        }
-        at_end += [call for name, call in calls.items() if name in self]
         scatters = "scattering" in self
-        at_begin = ["    path->state.scatterings = (index)0;"] if scatters else []
-        over = ["    restore_ray(path, ended);"] if scatters else []
-        return "\n".join(
+        at_begin = ["path->state.scatterings = (index)0;"] if scatters else []
+        at_begin += ["path->state.shadow = path->state.waiting = (mask)0;"] if self.modes else []
+        # a path may be cut off on a shadow ray
+        over = ["resume_path(path, ended & path->state.shadow);"] if self.modes else []
+        over += ["restore_ray(path, ended);"] if scatters else []
+        at_end = "Path *path, const Scene *scene, Rng *rng, const mask "
+        at_end += "stopped" if self.modes else "ended"
+        return "\n\n".join(
             [
-                "static void path_begin(Path *path)",
-                "{",
-                *at_begin,
-                "}",
-                "",
-                "static void path_end(Path *path, const mask ended)",
-                "{",
-                *over,
-                "}",
-                "",
-                "static void at_end(Path *path, const Scene *scene, Rng *rng, const mask ended)",
-                "{",
-                *(f"    {line}" for line in at_end),
-                "}",
+                _function("path_begin", "Path *path", at_begin),
+                _function("path_end", "Path *path, const mask ended", over),
+                _function("at_end", at_end, self._at_end()),
             ]
         )
 
+    def _at_end(self) -> list[str]:
+        """What the scene's effects do where flights have ended, in turn."""
+        gone = "ended & path->escaped"
+        calls = {
+            "length": "collect_length(path, ended);",
+            "environment": f"see_environment(path, scene, {gone});",
+            "environment_image": f"see_image(path, scene, {gone});",
+        }
+        collided = {
+            "emission": "emit(path, scene, here);",
+            "point_light": "light_directly(path, scene, rng, here);",
+            "scattering": "scatter(path, scene, rng, goes_on(path, scene, here));",
+        }
+        if self.modes:
+            collided |= {"point_light": "begin_shadow(path, scene, rng, here);"}
+            del collided["scattering"]
+        flights = [
+            "const mask seen = stopped & path->state.shadow, ended = stopped & ~seen;",
+            "end_shadow(path, scene, rng, seen);",
+        ]
+        return [
+            *(flights if self.modes else ()),
+            *(call for name, call in calls.items() if name in self),
+            "const mask here = ended & ~path->escaped;",
+            "if (!any_lane(here))",
+            "    return;",
+            *(call for name, call in collided.items() if name in self),
+        ]
+
+
+def _function(name: str, parameters: str, lines: list[str]) -> str:
+    body = [f"    {line}" for line in lines]
+    return "\n".join([f"static void {name}({parameters})", "{", *body, "}"])
+
 
 def of_scene(
-    case: Any, medium: Any, shadow: Shadow | None, *, chromatic: bool, near_light: bool, aims: bool
+    case: Any,
+    medium: Any,
+    shadow: Shadow | None,
+    *,
+    chromatic: bool,
+    near_light: bool,
+    aims: bool,
+    shares: bool = False,
 ) -> Effects:
     """Derive the effects of a case in its medium.
 
-    `effects: all` has every effect that this scene could have, switched on with what adds nothing.
+    `shares`: whether tracker and shadow can share the lookup of a step. `effects: all` has every
+    effect that this scene could have, switched on with what adds nothing.
     """
     everything = case.effects == "all"
     count = len(medium.channels)
@@ -188,6 +218,7 @@ def of_scene(
         near_light=near_light,
         aims=aims,
         shadow=shadow if "point_light" in names else None,
+        modes=shares and medium.kernel in DEAR_LOOKUPS and "point_light" in names,
         values=_values(case, medium, names, channels),
     )
 

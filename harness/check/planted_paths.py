@@ -7,6 +7,7 @@ from freepath.check.planted import HARD, Defect
 SCATTERING = f"{HARD}/scattering"
 CHANNELS = f"{HARD}/channels"
 SINGLE = f"{SCATTERING}/single/ratio-g-0.0/delta"
+VOXELS = f"{SCATTERING}/voxels/ratio-g-0.6/delta"
 
 PATHS = (
     Defect(
@@ -53,9 +54,27 @@ PATHS = (
     ),
     Defect(
         "a shadow ray that goes on behind the light",
-        "shadow.length = smaller(shadow.length, distance);",
+        "shadow->length = smaller(shadow->length, distance);",
         "",
         f"{SCATTERING}/light/inside/equiangular",
+    ),
+    Defect(
+        "a lane on a shadow ray that steps on its path too",
+        "path_step(path, scene, &drawn, here & ~state->shadow, sigma);",
+        "path_step(path, scene, &drawn, here, sigma);",
+        VOXELS,
+    ),
+    Defect(
+        "a path that goes on with the weight of its shadow ray",
+        "tint(&held, c, path->state.held_weight[c], where);",
+        "tint(&held, c, weight_of(path, c), where);",
+        VOXELS,
+    ),
+    Defect(
+        "a path that goes on where its shadow ray ended",
+        "    held.t = path->state.held_t;",
+        "",
+        f"{SCATTERING}/several/regular/regular",
     ),
     Defect(
         "a ray that its next path does not start on",

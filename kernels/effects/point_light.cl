@@ -1,5 +1,5 @@
 /* The light of a point, at every collision that scatters: an estimate of the transmittance between, by a
-   tracker of its own (shadow_begin, shadow_step) in an inner loop. */
+   tracker of its own (shadow_begin, shadow_step). */
 static real transmittance_of_shadow(const Path *shadow, const int channel)
 {
     const real kept = choose(shadow->escaped, weight_of(shadow, channel), (real)0);
@@ -20,34 +20,20 @@ static real way_to_light(const Path *path, const Scene *scene, Vector *to_light)
     return distance;
 }
 
-static void light_directly(Path *path, const Scene *scene, const Rng *rng, const mask here)
+/* Lanes `where` of `shadow` begin their way to the light; returns what it is worth if nothing is in between, but for
+   the weights of the path. */
+static real face_light(const Path *path, const Scene *scene, Path *shadow, const mask where)
 {
-    mask lit = here & less(path->state.scatterings, (index)(INTEGER)scene->optics.scatterings);
     Vector to_light;
     const real distance = way_to_light(path, scene, &to_light);
     const Vector ahead = heading(path, scene);
     const real cosine = ahead.x * to_light.x + ahead.y * to_light.y + ahead.z * to_light.z;
-    const real geometry = phase(scene, cosine) / (distance * distance);
-    Path shadow = *path;
-    turn(&shadow, scene, to_light, lit);
-    shadow.length = smaller(shadow.length, distance);
-    shadow.target = (real)0;
-    shadow.weight = (real)1;
-    shadow.live = lit;
-    shadow.escaped = (mask)0;
-    channels_begin(&shadow);
-    Rng shadow_rng = companion(rng);
-    shadow_begin(&shadow, scene, &shadow_rng);
-    for (int step = 0; step < SHADOW_STEPS && any_lane(shadow.live); ++step)
-        shadow_step(&shadow, scene, &shadow_rng);
-    path->lookups = shadow.lookups;
-    path->crossings = shadow.crossings;
-    path->violations = shadow.violations;
-    /* a shadow ray without end counts as a path without end */
-    path->steps = choose(shadow.live, (index)SHADOW_STEPS, path->steps);
-    for (int c = 0; c < CHANNELS; ++c) {
-        const real seen = transmittance_of_shadow(&shadow, c);
-        const SCALAR power = scene->optics.albedo[c] * scene->light.intensity[c];
-        collect(path, c, weight_of(path, c) * geometry * seen * power, lit);
-    }
+    turn(shadow, scene, to_light, where);
+    shadow->length = smaller(shadow->length, distance);
+    shadow->target = (real)0;
+    shadow->weight = (real)1;
+    shadow->live = where;
+    shadow->escaped = (mask)0;
+    channels_begin(shadow);
+    return phase(scene, cosine) / (distance * distance);
 }

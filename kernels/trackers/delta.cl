@@ -2,6 +2,7 @@
 title: Delta tracking
 estimands: [transmittance, free_path, radiance, path_length]
 needs: [majorant]
+shares_lookup: true
 channels: 1
 bounding: true
 unbiased: true

@@ -2,6 +2,7 @@
 title: Next-flight delta tracking
 estimands: [transmittance]
 needs: [majorant]
+shares_lookup: true
 bounding: true
 state:
   total: real

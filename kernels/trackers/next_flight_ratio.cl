@@ -2,6 +2,7 @@
 title: Next-flight ratio tracking
 estimands: [transmittance]
 needs: [majorant]
+shares_lookup: true
 state:
   throughput: real
   total: real

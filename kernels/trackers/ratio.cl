@@ -2,6 +2,7 @@
 title: Ratio tracking
 estimands: [transmittance]
 needs: [majorant]
+shares_lookup: true
 channels: 1
 bounding: false
 unbiased: true

@@ -2,6 +2,7 @@
 title: Spectral tracking
 estimands: [transmittance, free_path, radiance, path_length]
 needs: [majorant]
+shares_lookup: true
 channels: any
 parameters:
   probability:

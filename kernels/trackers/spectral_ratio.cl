@@ -2,6 +2,7 @@
 title: Ratio tracking of every channel
 estimands: [transmittance]
 needs: [majorant]
+shares_lookup: true
 channels: any
 citation: >-
   Novak, Selle, Jarosz 2014, Residual ratio tracking for estimating attenuation in participating media; Kutz,

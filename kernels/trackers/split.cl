@@ -2,6 +2,7 @@
 title: Splitting into the real and the null branch
 estimands: [transmittance, free_path]
 needs: [majorant]
+shares_lookup: true
 citation: >-
   Eymet, Poitou, Galtier, El Hafi, Terree, Fournier 2013, Null-collision meshless Monte Carlo;
   Szirmay-Kalos, Georgiev, Magdics, Molnar, Legrady 2017, Unbiased light transport estimators for

@@ -2,6 +2,7 @@
 title: Null-collision tracking with free sampling rate and acceptance
 estimands: [transmittance, free_path, radiance, path_length]
 needs: [majorant]
+shares_lookup: true
 parameters:
   acceptance:
     default: 1

@@ -2,6 +2,7 @@
 title: Weighted delta tracking
 estimands: [transmittance, free_path, radiance, path_length]
 needs: [majorant]
+shares_lookup: true
 bounding: {probability: [analog]}
 single_flight: {probability: [no_absorption]}
 parameters:

@@ -1,7 +1,10 @@
 """Paths that scatter: what does not change a sample. The checks of the group scattering do more."""
 
 import numpy as np
+import pytest
+from freepath import effects, runner
 from freepath.check.identities import check_mean
+from freepath.check.rig import Change
 
 GRID = {"cloud": {"resolution": 16, "interpolation": "trilinear"}}
 POINT = {"point": {"position": [0.3, 0.4, 2.0], "intensity": 10}}
@@ -32,6 +35,48 @@ def test_a_sample_is_the_same_in_any_number_of_lanes(rig):
     ]
     same = np.isclose(*scores, rtol=1e-3, atol=1e-6)
     assert same.mean() > 0.999
+
+
+@pytest.mark.parametrize(
+    ("tracker", "shadow", "arithmetic"),
+    [
+        ("delta", "ratio", "strict"),
+        ("delta", "delta", "double"),
+        ("weighted_delta", "next_flight_ratio", "strict"),
+        ("spectral", "spectral_ratio", "strict"),
+    ],
+)
+def test_lanes_with_a_mode_give_the_samples_of_an_inner_loop(
+    rig, monkeypatch, tracker, shadow, arithmetic
+):
+    medium = {"cloud": GRID["cloud"] | {"sigma_t": 10, "albedo": 0.9, "g": 0.3}}
+    if tracker == "spectral":
+        medium["cloud"] |= {"channels": [1, 0.5, 0.2], "albedo": [0.9, 0.5, 0.7]}
+    axes = {"light": POINT, "majorant": "grid", "shadow": shadow, "tracker": tracker}
+    axes["arithmetic"] = arithmetic
+    modes = radiance(rig, medium, **axes)
+    monkeypatch.setattr(effects, "DEAR_LOOKUPS", ())
+    loop = radiance(rig, medium, **axes)
+    found = ["shadow_mode.cl" in one.runner.program.source.text for one in (modes, loop)]
+    assert found == [True, False]
+    one, other = modes.record(64), loop.record(64)
+    same = np.isclose(one.scores, other.scores, rtol=1e-3, atol=1e-6)
+    assert same.mean() > 0.999
+    assert abs(one.lookups.sum() / other.lookups.sum() - 1) < 1e-3
+
+
+def test_a_path_cut_off_on_a_shadow_ray_leaves_the_next_its_ray(rig, monkeypatch):
+    """Samples of a unit, one after the other, are those that are taken one a unit."""
+    monkeypatch.setattr(runner, "STEP_CAP", 6)
+    short = rig
+    for name in ("MOST_STEPS", "SHADOW_STEPS"):
+        short = short.with_change(Change(f"#define {name} (1 << 20)", f"#define {name} 6"))
+    medium = {"cloud": GRID["cloud"] | {"sigma_t": 10, "albedo": 0.9, "g": 0.3}}
+    flight = radiance(short, medium, light=POINT, majorant="grid")
+    assert "shadow_mode.cl" in flight.runner.program.source.text
+    together, apart = flight.record(64), flight.record(1, blocks=64)
+    assert together.round.counters["truncated"] > 100
+    np.testing.assert_array_equal(together.score, apart.score)
 
 
 def test_a_tracker_of_shadow_rays_brings_the_mathematics_that_it_uses(rig):

@@ -42,6 +42,11 @@ SHADOWS = (
     ("delta", "ratio"), ("delta", "next_flight_ratio"), ("analytic", "regular"),
     ("regular", "delta"), ("weighted_delta", "track_length"), ("decomposition", "residual_ratio"),
 )  # fmt: skip
+SHARING = (
+    ("delta", "ratio"), ("weighted_delta", "next_flight_ratio"), ("two_knob", "next_flight_delta"),
+    ("delta", "delta"), ("delta", "split"), ("spectral", "spectral_ratio"),
+)  # fmt: skip
+"""Pairs of which lanes on paths and on shadow rays share a lookup, where there is one to share."""
 EMITTED = ("delta", "analytic", "regular", "weighted_delta", "two_knob")
 TOGETHER = (("regular", "regular"), ("weighted_delta", "ratio"))
 ANISOTROPIES = {"0.999": 0.999, "-0.999": -0.999, "1e-7": 1e-7, "-1e-9": -1e-9, "0.3": 0.3}
@@ -57,6 +62,8 @@ SENTENCES = {
     "the mean length of paths, which is 4 V / S whatever the density.",
     "single": "A phase function, a distance squared or a shadow ray that is off by a factor is no "
     "more than another light; single scattering has an integral.",
+    "voxels": "Lanes on paths and on shadow rays that share a lookup must not take over each "
+    "other's weights; in voxels that are all alike the integral is that of a homogeneous medium.",
     "light": "Distances that are drawn for a light lose their digits beside it, far away from it "
     "and on its line; the mean must stay that of the integral.",
     "several": "Beyond one scattering there is no reference: trackers are held against each other.",
@@ -97,6 +104,8 @@ def _paths() -> Iterator[Check]:
 def _lights() -> Iterator[Check]:
     for (tracker, shadow), g in itertools.product(SHADOWS, (0.0, 0.6)):
         yield _check(f"single/{shadow}-g-{g}", tracker, single, shadow=shadow, g=g)
+    for (tracker, shadow), g in itertools.product(SHARING, (0.0, 0.6)):
+        yield _check(f"voxels/{shadow}-g-{g}", tracker, voxels, shadow=shadow, g=g)
     for (name, sampler), place in itertools.product(NEAR.items(), PLACES):
         (tracker,) = sampler
         yield _check(f"light/{place}/{name}", tracker, light, sampler=sampler, place=place)
@@ -186,6 +195,16 @@ def single(rig: Rig, alpha: float, tracker: str, shadow: str, g: float) -> None:
     one = flight.run(8192)
     check_clean(one, bounded=True)
     check_mean(one.moments, flight.reference(), alpha)
+
+
+def voxels(rig: Rig, alpha: float, tracker: str, shadow: str, g: float) -> None:
+    """A point light outside of voxels that are all alike."""
+    optics = {"sigma_t": 2.0, "albedo": 0.5, "g": g}
+    axes = {"light": POINT, "scatterings": 1, "shadow": shadow, "tightness": 1.5}
+    medium = rig.volume(np.ones((4, 4, 4)), voxel_size=0.25, **optics)
+    one = _fly(rig, tracker, medium, majorant="grid", **axes).run(8192)
+    check_clean(one, bounded=True)
+    check_mean(one.moments, _fly(rig, tracker, _homogeneous(**optics), **axes).reference(), alpha)
 
 
 def light(
