@@ -152,11 +152,10 @@ def structure_of(
         paths = effects.of_scene(
             case,
             medium,
+            tracker,
             _shadow(case, catalog),
-            shares=bool(shadow_tracker and tracker.shares_lookup and shadow_tracker.shares_lookup),
             chromatic=chromatic,
-            near_light="light" in tracker.needs,
-            aims=tracker.aims,
+            shares=bool(shadow_tracker and tracker.shares_lookup and shadow_tracker.shares_lookup),
         )
     shadow = paths.shadow if paths else None
     needs = tracker.needs | (shadow.needs if shadow else frozenset())

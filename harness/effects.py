@@ -187,16 +187,9 @@ def _function(name: str, parameters: str, lines: list[str]) -> str:
 
 
 def of_scene(
-    case: Any,
-    medium: Any,
-    shadow: Shadow | None,
-    *,
-    chromatic: bool,
-    near_light: bool,
-    aims: bool,
-    shares: bool = False,
+    case: Any, medium: Any, tracker: Any, shadow: Shadow | None, *, chromatic: bool, shares: bool
 ) -> Effects:
-    """Derive the effects of a case in its medium.
+    """Derive the effects of a case in its medium, followed by a tracker of the catalog.
 
     `shares`: whether tracker and shadow can share the lookup of a step. `effects: all` has every
     effect that this scene could have, switched on with what adds nothing.
@@ -215,8 +208,8 @@ def of_scene(
         channels=channels,
         chromatic=chromatic or channels > 1,
         phase=phase,
-        near_light=near_light,
-        aims=aims,
+        near_light="light" in tracker.needs,
+        aims=tracker.aims,
         shadow=shadow if "point_light" in names else None,
         modes=shares and medium.kernel in DEAR_LOOKUPS and "point_light" in names,
         values=_values(case, medium, names, channels),
