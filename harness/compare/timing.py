@@ -13,6 +13,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from freepath.compare.moderation import moderated
 from freepath.compare.pairing import Key, Run, Side, scenes, table_of
 from scipy import stats
 
@@ -165,7 +166,21 @@ def changes(
                 others = np.delete(ratios, place)
                 spread = float(others.var(ddof=1)) if len(others) > 1 else ALONE**2
             found[key] = _change(before[key], after[key], ratio - taken, spread, len(keys))
+        if several:
+            found |= _steadied({key: found[key] for key in keys})
     return found, shifts
+
+
+def _steadied(found: dict[Key, Change]) -> dict[Key, Change]:
+    """Changes of one scene, with what their variances tell of each other."""
+    variances, freedoms = moderated(
+        np.array([one.stderr**2 for one in found.values()]),
+        np.array([one.freedom for one in found.values()]),
+    )
+    return {
+        key: Change(one.log_ratio, math.sqrt(variance), float(freedom))
+        for (key, one), variance, freedom in zip(found.items(), variances, freedoms, strict=True)
+    }
 
 
 def _shifted(reference: Side, contender: Side, keys: list[Key]) -> float:
