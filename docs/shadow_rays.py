@@ -24,6 +24,7 @@ LIGHT = {"point": {"position": [0.5, 0.5, 2], "intensity": 10}}
 GRID = {"grid": {"resolution": 8}}
 BALL = {"sigma_t": 10, "albedo": 0.5, "center": [0.5, 0.5, 0.5], "width": 0.2}
 CLOUD = {"resolution": 64, "sigma_t": 50, "albedo": 0.9, "g": 0.5}
+THIN = {"resolution": 32, "sigma_t": 8, "albedo": 0.9, "g": 0.7}
 WDAS = {"file": "wdas_cloud_sixteenth.vdb", "sigma_t": 0.05, "albedo": 0.999, "g": 0.8}
 HOMOGENEOUS = {"homogeneous": {"sigma_t": 4, "albedo": 0.5}}
 SCENES = {
@@ -35,6 +36,18 @@ SCENES = {
         "majorant": GRID,
     },
     "procedural cloud": {"medium": {"cloud": CLOUD}, "majorant": GRID},
+    "procedural cloud, three channels": {
+        "medium": {"cloud": CLOUD},
+        "majorant": GRID,
+        "effects": "all",
+    },
+    "thin cloud": {"medium": {"cloud": THIN}, "majorant": GRID, "scatterings": 8},
+    "thin cloud, three channels": {
+        "medium": {"cloud": THIN},
+        "majorant": GRID,
+        "scatterings": 8,
+        "effects": "all",
+    },
     "WDAS cloud": {
         "medium": {"volume": WDAS},
         "majorant": {"grid": {"resolution": [16, 11, 20]}},
@@ -46,13 +59,6 @@ STEP = "    flight_step(path, scene, rng);\n    const mask ended"
 MODES_STEP = "    path->live = flying;\n"
 SHADOW_STEP = "        shadow_step(&shadow, scene, &shadow_rng);"
 COUNT = "{0}->violations += 1; {0}->crossings -= {0}->live;"
-
-
-class Every:
-    """Every medium."""
-
-    def __contains__(self, name: str) -> bool:
-        return True
 
 
 @dataclass(frozen=True)
@@ -81,7 +87,7 @@ def counted(text: Source) -> Source:
 
 def form_of(rig: Rig, axes: dict, *, modes: bool) -> Form:
     """Compose and build a scene."""
-    effects.DEAR_LOOKUPS = Every() if modes else ()
+    effects.modes_pay = lambda medium, channels: modes
     known = {"estimand": "radiance", "tracker": "delta", "shadow": "ratio", "scatterings": 16}
     rays = {"orthographic": {"resolution": 32, "direction": [0, 0, 1]}}
     axes = known | {"rays": rays, "light": LIGHT} | axes

@@ -174,8 +174,7 @@ class Tracker:
     single_flight: bool | dict[str, tuple[Any, ...]]
     """Whether, or for which choices, what it scores on its way is for no path that goes on."""
     shares_lookup: bool
-    """Whether a step is a tentative collision, a lookup there, and changes there only: lanes on
-    paths and on shadow rays may share both."""
+    """Whether lanes on paths and on shadow rays may share a step's collision and its lookup."""
     unbiased: bool
     parameters: dict[str, Parameter]
     state: dict[str, str]

@@ -19,9 +19,13 @@ Chosen = tuple[str, str, tuple[str, ...]]
 SKY_ROWS, SKY_COLUMNS = 64, 128
 """Of the table that an image of the environment is resampled to, without the rows beyond poles."""
 
-DEAR_LOOKUPS = ("grid_nearest", "grid_trilinear")
-"""Media of which a lookup costs so much that lanes on shadow rays and on paths should share it:
-docs/decisions/shadow-rays.md."""
+
+def modes_pay(medium: str, channels: int) -> bool:
+    """Whether lanes on shadow rays and on paths are faster together, if they can share a lookup.
+
+    Where it is dear, in voxel grids, and holding a path is not: docs/decisions/shadow-rays.md.
+    """
+    return medium in {"grid_nearest", "grid_trilinear"} and channels == 1
 
 
 @dataclass(frozen=True)
@@ -211,7 +215,7 @@ def of_scene(
         near_light="light" in tracker.needs,
         aims=tracker.aims,
         shadow=shadow if "point_light" in names else None,
-        modes=shares and medium.kernel in DEAR_LOOKUPS and "point_light" in names,
+        modes=shares and modes_pay(medium.kernel, channels) and "point_light" in names,
         values=_values(case, medium, names, channels),
     )
 

@@ -44,7 +44,7 @@ SAMPLE_COLUMNS = (
 CONFIRM_COLUMNS = (
     "schema_version", "run_id", "case_id", "case", "device", "platform",
     "estimand", "medium", "tracker", "reference", "rays", "samples_per_ray", "repeats",
-    "time_s", "rmse_predicted", "rmse_measured", "rmse_low", "rmse_high",
+    "time_s", "drift", "rmse_predicted", "rmse_measured", "rmse_low", "rmse_high",
 )
 TEXTS = frozenset((
     "run_id", "case_id", "case", "status", "reason", "device", "platform", "driver_version",

@@ -66,7 +66,7 @@ def test_named_with_a_config_that_measures_it_again(call, cloud, monkeypatch):
         (
             ["nan.npy"],
             2,
-            "nan.npy: densities that cannot be used: 1 NaN (first [z, y, x] = [2, 3, 4])",
+            "nan.npy: densities that cannot be used: 1 NaN (first [z, y, x] = [2, 3, 4]: nan)",
         ),
         (["flat.npy"], 2, "flat.npy: expected an array of rank 3"),
         (["text.vdb"], 2, "text.vdb: is not an OpenVDB file"),

@@ -250,6 +250,7 @@ def test_a_source_has_the_effects_that_it_needs_and_no_other():
         "effects/around.cl",
         "effects/direction.cl",
         "effects/new_direction.cl",
+        "effects/until_last_light.cl",
         "effects/no_roulette.cl",
         "effects/scattering.cl",
         "math/circle_polynomial.cl",

@@ -54,8 +54,9 @@ def test_lanes_with_a_mode_give_the_samples_of_an_inner_loop(
         medium["cloud"] |= {"channels": [1, 0.5, 0.2], "albedo": [0.9, 0.5, 0.7]}
     axes = {"light": POINT, "majorant": "grid", "shadow": shadow, "tracker": tracker}
     axes["arithmetic"] = arithmetic
+    monkeypatch.setattr(effects, "modes_pay", lambda medium, channels: True)
     modes = radiance(rig, medium, **axes)
-    monkeypatch.setattr(effects, "DEAR_LOOKUPS", ())
+    monkeypatch.setattr(effects, "modes_pay", lambda medium, channels: False)
     loop = radiance(rig, medium, **axes)
     found = ["shadow_mode.cl" in one.runner.program.source.text for one in (modes, loop)]
     assert found == [True, False]
@@ -63,6 +64,21 @@ def test_lanes_with_a_mode_give_the_samples_of_an_inner_loop(
     same = np.isclose(one.scores, other.scores, rtol=1e-3, atol=1e-6)
     assert same.mean() > 0.999
     assert abs(one.lookups.sum() / other.lookups.sum() - 1) < 1e-3
+
+
+def test_a_lane_has_a_mode_where_that_is_faster(rig):
+    grid = {"cloud": GRID["cloud"] | {"sigma_t": 10, "albedo": 0.9}}
+    three = {"cloud": grid["cloud"] | {"channels": [1, 0.5, 0.2]}}
+    axes = {"light": POINT, "majorant": "grid"}
+    chosen = [
+        radiance(rig, {"homogeneous": {"sigma_t": 2.0, "albedo": 0.5}}, **axes),
+        radiance(rig, grid, tracker="regular", **axes),
+        radiance(rig, grid, shadow="residual_ratio", tracker="decomposition", **axes),
+        radiance(rig, three, tracker="spectral", shadow="spectral_ratio", **axes),
+        radiance(rig, grid, **axes),
+    ]
+    found = ["shadow_mode.cl" in one.runner.program.source.text for one in chosen]
+    assert found == [False, False, False, False, True]
 
 
 def test_a_path_cut_off_on_a_shadow_ray_leaves_the_next_its_ray(rig, monkeypatch):
