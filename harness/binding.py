@@ -54,11 +54,13 @@ class Scene:
         All that must bound or fit what the kernel reads comes from it; references are this one's.
         Raises VolumeError for voxels that cannot be stored so.
         """
-        medium = self._keep(("stored", case.storage), lambda: self.medium.stored(case.storage))
-        if medium is self.medium:
+        if case.storage == "float":
             return self
-        stored = Scene(medium, self.segments, self.search_path)
-        return self._keep(("scene", case.storage), lambda: stored)
+
+        def stored() -> Scene:
+            return Scene(self.medium.stored(case.storage), self.segments, self.search_path)
+
+        return self._keep(("stored", case.storage), stored)
 
     def sky(self, case: Case) -> Sky | None:
         """The image that lights a case, in the medium's channels; None where it has none.
@@ -186,7 +188,7 @@ def structure_of(
 
 def _declared(
     tracker: Tracker, given: Mapping[str, Any]
-) -> tuple[tuple[str, ...], tuple[source.Chosen, ...]]:
+) -> tuple[tuple[str, ...], tuple[effects.Chosen, ...]]:
     """The parameters that a kernel reads as numbers, and those that are defines."""
     read = {name: p for name, p in tracker.parameters.items() if not p.host}
     numbers = tuple(name for name, p in read.items() if p.choices is None)

@@ -159,16 +159,8 @@ class Search:
         return reaching
 
     def _finding(self, case: plan.Case, row: dict[str, str]) -> Finding | None:
-        variance, scale = number(row, "variance"), number(row, "reference")
-        scale = number(row, "estimate") if scale is None else scale
-        time = number(row, "time_per_sample_s")
-        if variance is None or not scale or not time:
-            return None
-        room = (self.accuracy * scale) ** 2 - (number(row, "bias_rms") or 0.0) ** 2
-        needed = time * max(1.0, variance / room) if room > 0 else math.inf
-        parts = [number(row, "time_noise"), number(row, "variance_noise") if variance else 0.0]
-        noise = math.hypot(*(1.0 if part is None else part for part in parts))
-        return Finding(case.name, axes_of(case), needed, noise)
+        found = needed(row, self.accuracy)
+        return Finding(case.name, axes_of(case), *found) if found else None
 
     def config_text(self, points: Sequence[Axes], stop: Axes) -> str:
         """A config of these cases, in YAML (JSON is YAML)."""
@@ -193,6 +185,23 @@ class Search:
         what = f"{self.estimand} to {100 * self.accuracy:g} %: the first case is soonest"
         path.write_text(f"# {what}; the others came next.\n{text}", encoding="utf-8")
         return path
+
+
+def needed(row: dict[str, str], accuracy: float) -> tuple[float, float] | None:
+    """Device seconds a ray to a relative RMSE, and half their 95 % interval relative to them.
+
+    RMSE(t)^2 = bias^2 + variance x time_per_sample / t, solved for t: infinite where the bias alone
+    is larger. None where the row does not tell.
+    """
+    variance, scale = number(row, "variance"), number(row, "reference")
+    scale = number(row, "estimate") if scale is None else scale
+    time = number(row, "time_per_sample_s")
+    if variance is None or not scale or not time:
+        return None
+    room = (accuracy * scale) ** 2 - (number(row, "bias_rms") or 0.0) ** 2
+    parts = [number(row, "time_noise"), number(row, "variance_noise") if variance else 0.0]
+    noise = math.hypot(*(1.0 if part is None else part for part in parts))
+    return (time * max(1.0, variance / room) if room > 0 else math.inf), noise
 
 
 def majorants_of(shape: Sequence[int]) -> list[Any]:

@@ -186,7 +186,7 @@ class Sweep:
         tracker = self.catalog.trackers[job.case.tracker]
         values, stored = scene.reference(job.case), scene.as_stored(job.case)
         largest = stored.largest_score(job.case)
-        claimed = stored.reference(job.case)
+        claimed = None if stored is scene else stored.reference(job.case)
         row = measured_row(job.row, tracker, found, values, largest, claimed)
         if self.render:
             wrong = write_pictures(self.folder.folder, row, job.case.rays, found.moments)

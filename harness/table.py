@@ -160,6 +160,11 @@ def _cells(row: Row, *, best: bool) -> list[str]:
     ]
 
 
+def lit(row: Row) -> bool:
+    """Whether a case follows paths, in whatever light; of other cases it is none."""
+    return row["light"] not in ("", "none")
+
+
 def bounces(row: Row) -> str:
     """How many scatterings are followed."""
     count = row["scatterings"]
@@ -198,8 +203,8 @@ def table_of(rows: list[Row]) -> Table:
     first = rows[0]
     reference = next((short(number(row, "reference"), 4) for row in rows if row["reference"]), "?")
     rays = "1 ray" if first["rays"] == "1" else f"{first['rays']} rays"
-    lit = "" if first["light"] in ("", "none") else f" in {first['light']}, {bounces(first)}"
-    title = f"{first['estimand']} of {first['medium']}{lit}, {rays}, reference {reference}"
+    light = f" in {first['light']}, {bounces(first)}" if lit(first) else ""
+    title = f"{first['estimand']} of {first['medium']}{light}, {rays}, reference {reference}"
     table = Table(title=escape(title), title_justify="left", title_style="bold", box=None)
     table.padding = (0, 1, 0, 0)
     table.add_column("tracker", overflow="fold")

@@ -199,8 +199,8 @@ class Rig:
         )
         text = source.compose(structure)
         stored = scene.as_stored(case)
-        read = stored.medium.data
-        data = KernelData.upload(self.device, scene.segments, read, case.arithmetic)
+        voxels = stored.medium.data
+        data = KernelData.upload(self.device, scene.segments, voxels, case.arithmetic)
         runner = binding.runner_of(case, structure, stored, self.program(text), data)
         read = scene.segments.astype(scalar_type(case.arithmetic)).astype(np.float64)
         tracker = self.catalog.trackers[case.tracker]

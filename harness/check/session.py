@@ -69,9 +69,12 @@ class Session:
             for number, check in self.chosen
         ]
         progress = printing.Progress(self.chosen, len(tasks))
-        setting = Setting(f"{info.platform} / {info.name} / {info.driver_version}")
-        setting = replace(setting, trackers=tuple(options.trackers))
-        setting = replace(setting, arithmetic=options.arithmetic, storage=options.storage)
+        setting = Setting(
+            f"{info.platform} / {info.name} / {info.driver_version}",
+            trackers=tuple(options.trackers),
+            arithmetic=options.arithmetic,
+            storage=options.storage,
+        )
         if options.seed is not None:
             setting = replace(setting, seed=options.seed)
         pool = Pool(

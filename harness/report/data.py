@@ -11,7 +11,7 @@ from typing import Any
 
 from freepath.errors import FreepathError
 from freepath.results import CHECKS, CONFIRM, CONFIRM_COLUMNS, RUN, SUMMARY, read_rows
-from freepath.table import Row, along, bounces, number, tracker_label
+from freepath.table import Row, along, bounces, lit, number, tracker_label
 
 DEEPEST, HIGHEST = 1e-4, 10.0
 """Relative errors between which curves are drawn."""
@@ -135,7 +135,7 @@ def _record(row: Row, variants: list[tuple[str, str]], device: str) -> dict[str,
     record = {
         "q": _question(row, row["light"]),
         "scene": _question(row),
-        "light": row["light"] if _lit(row) else None,
+        "light": row["light"] if lit(row) else None,
         "device": device,
         "case": row["case"],
         "label": label,
@@ -158,14 +158,10 @@ def _record(row: Row, variants: list[tuple[str, str]], device: str) -> dict[str,
     return record | _errors(row) | {name: _time(row[column]) for name, column in LADDER.items()}
 
 
-def _lit(row: Row) -> bool:
-    return row["light"] not in ("", "none")
-
-
 def _question(row: Row, *light: str) -> str:
     """What a row answers: only rows of one question are compared. Without a light: in any light."""
-    lit = [*light, bounces(row)] if _lit(row) else []
-    return ", ".join([row["estimand"], row["medium"], *lit, f"{row['rays'] or '?'} rays"])
+    told = [*light, bounces(row)] if lit(row) else []
+    return ", ".join([row["estimand"], row["medium"], *told, f"{row['rays'] or '?'} rays"])
 
 
 def _errors(row: Row) -> dict[str, float | None]:

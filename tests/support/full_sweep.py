@@ -16,7 +16,7 @@ from freepath.commands.common import volume_of
 from freepath.commands.recommend import told_of
 from freepath.device import open_devices
 from freepath.results import ResultFolder
-from freepath.table import number, seconds
+from freepath.table import seconds
 
 
 def search_of(options: argparse.Namespace) -> recommend.Search:
@@ -45,18 +45,8 @@ def full_sweep(search: recommend.Search, at_most_s: float) -> dict[str, tuple[fl
     session.Run(loaded, search.known, cases, results, search.clock, *search.told).execute(
         [search.device]
     )
-    return {row["case"]: needed(row, search.accuracy) for row in results.rows()}
-
-
-def needed(row: dict[str, str], accuracy: float) -> tuple[float, float]:
-    """RMSE(t)^2 = bias^2 + variance x time_per_sample / t, solved for t; infinite by bias."""
-    variance, scale = number(row, "variance"), number(row, "reference")
-    time_s = number(row, "time_per_sample_s")
-    if variance is None or not scale or not time_s:
-        return math.inf, 0.0
-    room = (accuracy * scale) ** 2 - (number(row, "bias_rms") or 0.0) ** 2
-    noise = math.hypot(number(row, "time_noise") or 0.0, number(row, "variance_noise") or 0.0)
-    return (time_s * max(1.0, variance / room) if room > 0 else math.inf), noise
+    never = math.inf, 0.0
+    return {r["case"]: recommend.needed(r, search.accuracy) or never for r in results.rows()}
 
 
 def arguments() -> argparse.Namespace:

@@ -12,7 +12,7 @@ from freepath.check.double_scattering import double_scattering
 from freepath.check.identities import check_clean, check_mean
 from freepath.check.model import Check
 from freepath.check.rig import Flight, Rig
-from freepath.check.suite.scattering import FEW, PHASES, PLACES, light
+from freepath.check.suite.scattering import FEW, PHASES, PLACES, follow, homogeneous, light
 from freepath.stats import Moments
 
 ALBEDO, SIGMA_T = 0.5, 2.0
@@ -29,10 +29,9 @@ TWICE = (
 def checks(catalog: Catalog) -> Iterator[Check]:
     """Of the tracker `joint`, and of delta tracking where its variance is finite."""
     for place, (phase, g) in itertools.product(PLACES, PHASES.items()):
-        once = {"sampler": {"joint": {}}, "place": place, "g": g}
-        yield _check(f"light/{place}/joint-{phase}", "joint", ONCE, "fast", light, once)
-        twice = {"sampler": {"joint": {}}, "place": place, "g": g}
-        yield _check(f"double/{place}/joint-{phase}", "joint", TWICE, "slow", double, twice)
+        options = {"sampler": {"joint": {}}, "place": place, "g": g}
+        yield _check(f"light/{place}/joint-{phase}", "joint", ONCE, "fast", light, options)
+        yield _check(f"double/{place}/joint-{phase}", "joint", TWICE, "slow", double, options)
     for name, given in {"cells": {"cells": 1}, "share": {"share": 0.9}}.items():
         few = {"sampler": {"joint": given}, "place": "inside", "g": 0.9}
         yield _check(f"double/inside/joint-{name}", "joint", TWICE, "slow", double, few)
@@ -70,14 +69,12 @@ def double(rig: Rig, alpha: float, tracker: str, sampler: Any, place: str, g: fl
 def _fly(
     rig: Rig, sampler: Any, position: Any, intensity: float, g: float, scatterings: int
 ) -> Flight:
-    return rig.flight(
-        record=False,
-        estimand="radiance",
-        medium={"homogeneous": {"sigma_t": SIGMA_T, "albedo": ALBEDO, "g": g}},
-        tracker=sampler,
+    return follow(
+        rig,
+        sampler,
+        homogeneous(SIGMA_T, albedo=ALBEDO, g=g),
         light={"point": {"position": position.tolist(), "intensity": float(intensity)}},
         scatterings=scatterings,
         shadow="analytic",
         rays=FEW,
-        lanes=16,
     )

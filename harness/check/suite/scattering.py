@@ -37,7 +37,7 @@ NEAR: dict[str, dict[str, Any]] = {
     "tabulated-product": {"tabulated": {"table": "product", "bins": 8}},
     "combined": {"combined": {"share": 0.3}},
 }
-NEAR_TRACKERS = ("equiangular", "tabulated", "joint")
+NEAR_TRACKERS = ("equiangular", "tabulated", "joint", "combined")
 SHADOWS = (
     ("delta", "ratio"), ("delta", "next_flight_ratio"), ("analytic", "regular"),
     ("regular", "delta"), ("weighted_delta", "track_length"), ("decomposition", "residual_ratio"),
@@ -86,7 +86,7 @@ def _without_reference() -> Iterator[Check]:
             yield _check(name, "delta", furnace, kind=kind, sigma_t=depth, g=g)
     for kind in ("grid", "stretched"):
         yield _check(f"furnace/{kind}", "regular", furnace, kind=kind, sigma_t=30, g=0.9)
-    for tracker in (*NEAR_TRACKERS, "combined"):
+    for tracker in NEAR_TRACKERS:
         yield _check(f"several/ratio/{tracker}", tracker, several, shadow="ratio")
     for tracker, shadow in TOGETHER:
         yield _check(f"several/{shadow}/{tracker}", tracker, several, shadow=shadow)
@@ -127,12 +127,14 @@ def _check(name: str, tracker: str, situation: Any, **options: Any) -> Check:
     return Check(f"hard/{GROUP}/{full}", labels, SENTENCES[kind], run, kernels=kernels)
 
 
-def _fly(rig: Rig, tracker: Any, medium: Any, **axes: Any) -> Flight:
+def follow(rig: Rig, tracker: Any, medium: Any, **axes: Any) -> Flight:
+    """A flight of paths that collect radiance, in 16 lanes and without a record."""
     given = {"estimand": "radiance", "medium": medium, "tracker": tracker, "lanes": 16} | axes
     return rig.flight(record=False, **given)
 
 
-def _homogeneous(sigma_t: float = 2.0, **keys: Any) -> dict[str, Any]:
+def homogeneous(sigma_t: float = 2.0, **keys: Any) -> dict[str, Any]:
+    """The medium as a config has it."""
     return {"homogeneous": {"sigma_t": sigma_t, **keys}}
 
 
@@ -142,10 +144,10 @@ def furnace(rig: Rig, alpha: float, tracker: str, kind: str, **keys: Any) -> Non
     if kind == "stretched":
         # directions are turned in the world, where voxels need not be cubes
         keys["size"] = [1, 3, 0.5]
-    homogeneous = kind == "homogeneous"
-    medium = _homogeneous(**keys) if homogeneous else {"cloud": CLOUD | keys}
-    majorant = "global" if homogeneous else "grid"
-    one = _fly(rig, tracker, medium, majorant=majorant).run(32)
+    alike = kind == "homogeneous"
+    medium = homogeneous(**keys) if alike else {"cloud": CLOUD | keys}
+    majorant = "global" if alike else "grid"
+    one = follow(rig, tracker, medium, majorant=majorant).run(32)
     check_clean(one, bounded=True)
     error = np.max(np.abs(one.moments.mean - 1.0))
     demand(error < 1e-5, f"mean: a furnace of 1 is off by {error:.3g}")
@@ -155,8 +157,8 @@ def furnace(rig: Rig, alpha: float, tracker: str, kind: str, **keys: Any) -> Non
 
 def emission(rig: Rig, alpha: float, tracker: str) -> None:
     """A glowing medium that does not scatter, before a bright background."""
-    medium = _homogeneous(1.5, emission=3)
-    flight = _fly(rig, tracker, medium, light={"uniform": {"radiance": 0.5}})
+    medium = homogeneous(1.5, emission=3)
+    flight = follow(rig, tracker, medium, light={"uniform": {"radiance": 0.5}})
     one = flight.run(4096)
     check_clean(one, bounded=True)
     check_mean(one.moments, flight.reference(), alpha)
@@ -165,20 +167,20 @@ def emission(rig: Rig, alpha: float, tracker: str) -> None:
 def rod(rig: Rig, alpha: float, tracker: str, albedo: float, depth: float) -> None:
     """Transmission and reflection together; of emission, what is missing of a furnace."""
     through, back = rod_model(albedo, depth)
-    lit = _homogeneous(depth, albedo=albedo, phase="rod")
-    one = _fly(rig, tracker, lit, rays=FEW).run(8192)
+    lit = homogeneous(depth, albedo=albedo, phase="rod")
+    one = follow(rig, tracker, lit, rays=FEW).run(8192)
     check_mean(one.moments, np.full(16, through + back), alpha / 2)
-    glowing = _homogeneous(depth, albedo=albedo, phase="rod", emission=1)
-    one = _fly(rig, tracker, glowing, rays=FEW, light="dark").run(8192)
+    glowing = homogeneous(depth, albedo=albedo, phase="rod", emission=1)
+    one = follow(rig, tracker, glowing, rays=FEW, light="dark").run(8192)
     check_mean(one.moments, np.full(16, 1 - through - back), alpha / 2)
 
 
 def length(rig: Rig, alpha: float, tracker: str, sigma_t: float, g: float) -> None:
     """4 V / S under isotropic uniform light (Blanco and Fournier 2003)."""
     size = np.array(SIZE)
-    medium = _homogeneous(sigma_t, albedo=1, g=g, size=SIZE)
+    medium = homogeneous(sigma_t, albedo=1, g=g, size=SIZE)
     rays = {"chords": {"count": 8192}}
-    means = _fly(rig, tracker, medium, estimand="path_length", rays=rays).run(16).moments.mean
+    means = follow(rig, tracker, medium, estimand="path_length", rays=rays).run(16).moments.mean
     surface = 2 * (size[0] * size[1] + size[1] * size[2] + size[2] * size[0])
     expected = 4 * size.prod() / surface
     error = means.std(ddof=1) / np.sqrt(len(means))
@@ -190,8 +192,8 @@ def length(rig: Rig, alpha: float, tracker: str, sigma_t: float, g: float) -> No
 
 def single(rig: Rig, alpha: float, tracker: str, shadow: str, g: float) -> None:
     """A point light outside of a homogeneous medium."""
-    medium = _homogeneous(albedo=0.5, g=g)
-    flight = _fly(rig, tracker, medium, light=POINT, scatterings=1, shadow=shadow)
+    medium = homogeneous(albedo=0.5, g=g)
+    flight = follow(rig, tracker, medium, light=POINT, scatterings=1, shadow=shadow)
     one = flight.run(8192)
     check_clean(one, bounded=True)
     check_mean(one.moments, flight.reference(), alpha)
@@ -202,9 +204,9 @@ def voxels(rig: Rig, alpha: float, tracker: str, shadow: str, g: float) -> None:
     optics = {"sigma_t": 2.0, "albedo": 0.5, "g": g}
     axes = {"light": POINT, "scatterings": 1, "shadow": shadow, "tightness": 1.5}
     medium = rig.volume(np.ones((4, 4, 4)), voxel_size=0.25, **optics)
-    one = _fly(rig, tracker, medium, majorant="grid", **axes).run(8192)
+    one = follow(rig, tracker, medium, majorant="grid", **axes).run(8192)
     check_clean(one, bounded=True)
-    check_mean(one.moments, _fly(rig, tracker, _homogeneous(**optics), **axes).reference(), alpha)
+    check_mean(one.moments, follow(rig, tracker, homogeneous(**optics), **axes).reference(), alpha)
 
 
 def light(
@@ -216,7 +218,7 @@ def light(
     lamp = {"point": {"position": position, "intensity": 10 * distance**2}}
     axes = {"light": lamp, "scatterings": 1, "shadow": "ratio"}
     axes["rays"] = {"orthographic": {"resolution": 9}}
-    flight = _fly(rig, sampler, _homogeneous(albedo=0.5, g=g), **axes)
+    flight = follow(rig, sampler, homogeneous(albedo=0.5, g=g), **axes)
     one, expected = flight.run(8192), flight.reference()
     check_clean(one, bounded=True)
     known = np.isfinite(expected)
@@ -227,12 +229,12 @@ def light(
 
 def several(rig: Rig, alpha: float, tracker: str, shadow: str) -> None:
     """A cloud that scatters more than once, against delta tracking."""
-    near = tracker in (*NEAR_TRACKERS, "combined")
+    near = tracker in NEAR_TRACKERS
     # weights of a sampler of light multiply: after eight scatterings only their tail counts
     medium = {"cloud": CLOUD | {"sigma_t": 3 if near else 10, "albedo": 0.9, "g": 0.4}}
     axes = {"light": POINT, "scatterings": 2 if near else 8, "majorant": "grid"}
-    one = _fly(rig, tracker, medium, shadow=shadow, **axes).run(4096)
-    other = _fly(rig, "delta", medium, shadow="ratio", **axes).run(4096, first_sample=10000)
+    one = follow(rig, tracker, medium, shadow=shadow, **axes).run(4096)
+    other = follow(rig, "delta", medium, shadow="ratio", **axes).run(4096, first_sample=10000)
     check_clean(one, bounded=True)
     joint = Moments(4096, one.moments.mean, one.moments.m2 + other.moments.m2)
     check_mean(joint, other.moments.mean, alpha)
