@@ -8,23 +8,32 @@ high scores do to the precision depends on the time spent and hardly on n, so ea
 
 A machine that has become slower since the case was measured is no error of its prediction. Repeats
 therefore take turns with rounds laid out as those that the prediction is from, and what a repeat
-takes is told in units of these.
+takes is told in units of these. Rounds are disturbed now and then, which makes them longer, never
+shorter: of either the lower quartile of times counts.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from freepath.measure import UNITS_PER_LANE, Bench, Shape, shape_of
+from freepath.measure import UNITS_PER_LANE, Bench, shape_of
 from freepath.runner import SAMPLES_PER_UNIT, Runner
 from freepath.stats import relative_half_width
 
 BUDGET_S = 0.32
-"""Device time for each sample count, and for the rounds that they take turns with."""
+"""Device time for each sample count, and the rounds that they take turns with."""
 TURNS = 8
+MOST = 4
+"""So many times that is spent where errors or times are not settled by then."""
+SETTLED = 0.05
+"""Half-width of the 95 % interval of an error, relative; and how far times of every other turn may
+be from those between."""
+QUIET = 0.25
+"""The quantile of times that stands for those of an undisturbed machine."""
 REPEATS = 16
 """Repeats at least, so that their spread gives an interval; a multiple of TURNS."""
 STEP = 2
@@ -45,8 +54,24 @@ class Repeats:
     """Repeats in a turn."""
     squares: list[np.ndarray] = field(default_factory=list)
     """Squared error of each repeat, averaged over rays."""
-    paces: list[float] = field(default_factory=list)
-    """Time of a sample in each turn, in units of that of the round beside it."""
+    times: list[float] = field(default_factory=list)
+    """Seconds of a sample in each turn."""
+
+    @property
+    def settled(self) -> bool:
+        """Whether its error is known well, and its time."""
+        width = relative_half_width(np.concatenate(self.squares).tolist()) / 2
+        return width <= SETTLED and steady(self.times)
+
+
+def quiet(times: Sequence[float]) -> float:
+    """The time that undisturbed ones have."""
+    return float(np.quantile(times, QUIET))
+
+
+def steady(times: Sequence[float]) -> bool:
+    """Whether either half of them tells the same."""
+    return abs(quiet(times[::2]) / quiet(times[1::2]) - 1.0) <= SETTLED
 
 
 def repeats_of(rays: int, lanes_in_all: int, time_per_sample: float) -> list[Repeats]:
@@ -78,40 +103,36 @@ def confirmed_rows(row: dict[str, Any], bench: Bench, reference: np.ndarray) -> 
     """
     runner, seconds = bench.timed, row["time_per_sample_s"]
     counts = repeats_of(runner.rays, runner.lanes_in_all, seconds)
-    first, drifts = bench.measurement.moments.count, []
+    first, beside = bench.measurement.moments.count, []
     per_ray = int(BUDGET_S / TURNS / (runner.rays * seconds))
     shape = shape_of(per_ray, runner.rays, seconds, runner.lanes_in_all)
-    for _ in range(TURNS):
-        drifts.append(_seconds(runner, first, shape) / seconds)
+    for turn in range(1, MOST * TURNS + 1):
+        beside.append(runner.run(first, shape.samples, shape.blocks).time_per_sample_s)
         for one in counts:
-            _take(one, runner, first, reference, drifts[-1] * seconds)
+            _take(one, runner, first, reference)
             first += one.samples * one.blocks
-    return [row | _measured(row, one, float(np.median(drifts))) for one in counts]
+        if turn % TURNS == 0 and steady(beside) and all(one.settled for one in counts):
+            break
+    return [row | _measured(row, one, quiet(beside)) for one in counts]
 
 
-def _seconds(runner: Runner, first: int, shape: Shape) -> float:
-    """Time of a sample now."""
-    return runner.run(first, shape.samples, shape.blocks).time_per_sample_s
-
-
-def _take(
-    repeats: Repeats, runner: Runner, first: int, reference: np.ndarray, seconds: float
-) -> None:
+def _take(repeats: Repeats, runner: Runner, first: int, reference: np.ndarray) -> None:
     one = runner.run(first, repeats.samples, repeats.blocks)
     repeats.squares.append(((one.means - reference) ** 2).reshape(len(one.means), -1).mean(1))
-    repeats.paces.append(one.time_per_sample_s / seconds)
+    repeats.times.append(one.time_per_sample_s)
 
 
-def _measured(row: dict[str, Any], repeats: Repeats, drift: float) -> dict[str, Any]:
+def _measured(row: dict[str, Any], repeats: Repeats, beside: float) -> dict[str, Any]:
+    """What repeats say; `beside` is the time of a sample in the rounds beside them."""
     squares = np.concatenate(repeats.squares)
     square, width = float(squares.mean()), relative_half_width(squares.tolist())
-    pace = float(np.median(repeats.paces))
+    pace = quiet(repeats.times) / beside
     time_s = pace * repeats.samples * row["time_per_sample_s"]
     return {
         "samples_per_ray": repeats.samples,
         "repeats": len(squares),
         "time_s": time_s,
-        "drift": drift,
+        "drift": beside / row["time_per_sample_s"],
         "rmse_predicted": predicted(row, time_s),
         "rmse_measured": math.sqrt(square),
         "rmse_low": math.sqrt(square * max(0.0, 1.0 - width)) if square else 0.0,

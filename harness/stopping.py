@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from freepath.stats import relative_half_width
 
 PILOT_ROUNDS = 5
 """Rounds after which the number that the wanted error needs is fixed: stopping as soon as an
 estimate looks precise would favour lucky ones."""
+PATIENCE = 10.0
+"""Of a case whose prediction is to be confirmed."""
 
 
 @dataclass(frozen=True)
@@ -27,6 +29,12 @@ class Rule:
     """Exactly this many samples of each ray, instead of the three others."""
     rounds: int = 10
     """How many rounds these are divided into, at least."""
+    patience: float = 1.0
+    """So many times at_most_s a case may take until its error is as wanted."""
+
+    def confirming(self, error: float) -> Rule:
+        """What a prediction needs that is to be held to a measurement: its error must be known."""
+        return replace(self, error=min(self.error, error), patience=PATIENCE)
 
 
 class Stopping:
@@ -43,11 +51,26 @@ class Stopping:
         """
         if self._rounds_for_error is None and len(times) >= PILOT_ROUNDS:
             self._rounds_for_error = self._planned(variances)
+        over = spent_s >= self.rule.at_most_s
+        if self._error_is_known(variances):
+            if relative_half_width(times) <= self.rule.time_noise:
+                return "precise"
+            return "budget" if over else ""
+        return "budget" if spent_s >= self.rule.at_most_s * self.rule.patience else ""
+
+    def _error_is_known(self, variances: Sequence[float]) -> bool:
+        """Whether the rounds that were planned are over, and, with patience, were enough.
+
+        Rare high scores may have kept out of the pilot's. Asked at few times only, each twice as
+        late as the one before, so that luck has few chances.
+        """
         wanted = self._rounds_for_error
-        enough = wanted is not None and len(times) >= wanted
-        if enough and relative_half_width(times) <= self.rule.time_noise:
-            return "precise"
-        return "budget" if spent_s >= self.rule.at_most_s else ""
+        if wanted is None or len(variances) < wanted:
+            return False
+        if self.rule.patience > 1 and self._planned(variances) > len(variances):
+            self._rounds_for_error = 2 * len(variances)
+            return False
+        return True
 
     def _planned(self, variances: Sequence[float]) -> int:
         """How many rounds the wanted interval of the RMSE takes, from the spread of the pilot's."""

@@ -9,7 +9,7 @@ from typing import Any
 from freepath import equal_time, limits, majorants, source
 from freepath.binding import Scene, runner_of, structure_of
 from freepath.catalog import Catalog
-from freepath.confirm import confirmed_rows
+from freepath.confirm import SETTLED, confirmed_rows
 from freepath.device import Device, Program
 from freepath.errors import BuildError, DriverLimitError, FreepathError, RunError
 from freepath.measure import Bench, interleave
@@ -121,6 +121,7 @@ class Sweep:
         )
         samples = limits.samples_of(stop.samples, self.device.info)
         rule = Rule(stop.error, stop.time_noise, stop.at_most, samples, stop.rounds)
+        rule = rule.confirming(SETTLED) if self.confirm else rule
         bench = Bench(timed, counting, rule)
         bench.prepare()
         self._add_build(job, bench.measurement.time_compile_s)

@@ -38,6 +38,24 @@ class NormalRunner:
         )
 
 
+class Disturbed(NormalRunner):
+    """A third of its rounds take twice as long."""
+
+    def run(self, first, samples, blocks=1):
+        self.slower = 1.0 + (self.random.random() < 1 / 3)
+        return super().run(first, samples, blocks)
+
+
+class RareRunner(NormalRunner):
+    """Errors nearly all of which are of few estimates."""
+
+    def run(self, first, samples, blocks=1):
+        one = super().run(first, samples, blocks)
+        high = self.random.random(blocks) < 0.05
+        one.means = 0.5 + (one.means - 0.5) * np.where(high, 30.0, 1.0)[:, None]
+        return one
+
+
 def rows_of(runner, **row):
     row = {
         "estimate": 0.5,
@@ -69,6 +87,22 @@ def test_a_right_prediction_is_confirmed_whatever_the_pace(slower):
         width = (row["rmse_high"] - row["rmse_low"]) / 2
         assert abs(row["rmse_measured"] - row["rmse_predicted"]) < 2 * width
         assert width < 0.03 * row["rmse_measured"]
+
+
+def test_disturbed_rounds_do_not_move_a_prediction():
+    rows = rows_of(Disturbed())
+    for row in rows:
+        assert row["drift"] == pytest.approx(1.0)
+        assert row["time_s"] == pytest.approx(row["samples_per_ray"] * SECONDS)
+
+
+@pytest.mark.parametrize(
+    ("runner", "turns"),
+    [(NormalRunner(), confirm.TURNS), (RareRunner(), confirm.MOST * confirm.TURNS)],
+)
+def test_it_goes_on_until_errors_are_known_or_enough_is_spent(runner, turns):
+    rows_of(runner)
+    assert len(runner.taken) == 4 * turns
 
 
 @pytest.mark.parametrize("change", [{"variance": 0.05}, {"bias_rms": 0.02}, {"variance": 0.03}])

@@ -1,8 +1,10 @@
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from freepath.stopping import PILOT_ROUNDS, Rule, Stopping
+from freepath.stats import relative_half_width
+from freepath.stopping import PATIENCE, PILOT_ROUNDS, Rule, Stopping
 
 LOOSE = {"error": 1.0, "time_noise": 1.0, "at_most_s": math.inf}
 
@@ -78,3 +80,36 @@ def test_the_promised_precision_of_the_rmse_is_kept():
         rmse = math.sqrt(np.mean(variances[:taken]))
         inside.append(abs(rmse - 1.0) <= 0.05)
     assert np.mean(inside) >= 0.95 - 3 * math.sqrt(0.95 * 0.05 / 400)
+
+
+def rare(count=4000):
+    """Variances of rounds: one in four holds rare high scores, one in twelve rarer ones."""
+    ordinary = [10.0 if place % 4 == 3 else 1.0 for place in range(count)]
+    return [100.0 if place % 12 == 11 else v for place, v in enumerate(ordinary)]
+
+
+def test_a_prediction_to_confirm_is_measured_on_until_its_error_is_known():
+    rule = Rule(**LOOSE | {"error": 0.5, "at_most_s": 6.0})
+    assert rounds_taken(rule, steady(), rare()) == (6, "budget")
+    patient = replace(rule.confirming(0.5), at_most_s=200.0)
+    taken, reason = rounds_taken(patient, steady(4000), rare())
+    assert reason == "precise"
+    assert relative_half_width(rare()[:taken]) / 2 <= 0.5
+    # what the pilot asked for was too few: they had not seen the rarest
+    planned, _ = rounds_taken(replace(patient, patience=1), steady(4000), rare())
+    assert taken in {planned * 2**power for power in range(1, 10)}
+
+
+def test_patience_ends():
+    rule = Rule(**LOOSE | {"at_most_s": 6.0}).confirming(0.01)
+    assert rounds_taken(rule, steady(), rare()) == (6 * PATIENCE, "budget")
+
+
+def test_patience_is_for_errors_not_for_times():
+    rule = Rule(error=0.1, time_noise=1e-9, at_most_s=8.0).confirming(0.05)
+    assert rounds_taken(rule, noisy(), steady()) == (8, "budget")
+
+
+def test_confirming_asks_for_no_less_than_the_config():
+    assert Rule(**LOOSE | {"error": 0.01}).confirming(0.05).error == 0.01
+    assert Rule(**LOOSE).confirming(0.05).error == 0.05
