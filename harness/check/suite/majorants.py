@@ -141,7 +141,7 @@ def clamped_bias(rig: Rig, alpha: float, tracker: Tracker) -> None:
         axes["parameters"] = {"control": "number", "share": 0}
     flight = homogeneous(rig, tracker, 2.0, **axes)
     moments = flight.run(8192).moments
-    depth = flight.medium.optical_depth(flight.segments)
+    depth = flight.depth
     clamped = np.exp(-depth / 2.0)
     if moments.m2.any():
         check_mean(moments, clamped, alpha / 2)

@@ -99,7 +99,7 @@ def relative(rig: Rig, alpha: float, tracker: Tracker, depth: float) -> None:
     axes = {"arithmetic": "double", "lanes": 4, "rays": UPWARD, "tightness": 1.0 / depth}
     flight = homogeneous(rig, tracker, depth, **axes)
     moments = flight.record(4096).round.moments
-    expected = -np.expm1(-flight.medium.optical_depth(flight.segments)).mean()
+    expected = -np.expm1(-flight.depth).mean()
     taken = (1.0 - moments.mean).mean()
     error = np.sqrt((moments.variance / moments.count).sum()) / len(moments.mean)
     # a rounding of T for each collision is the least that can be had
