@@ -118,7 +118,8 @@ def huge(rig: Rig, alpha: float, tracker: Tracker) -> None:
 def thick(rig: Rig, alpha: float, tracker: Tracker, depth: float) -> None:
     """Nothing comes through, and nothing becomes infinite or no number."""
     rays = UPWARD if depth < 1e5 else {"orthographic": {"resolution": 1}}
-    one = homogeneous(rig, tracker, depth, rays=rays).record(16)
+    # blocks of one sample: those of a block would follow each other in one lane
+    one = homogeneous(rig, tracker, depth, rays=rays).record(1, blocks=16)
     found = one.round.counters
     demand(not found["nonfinite"], f"{found['nonfinite']} scores are no numbers")
     demand(not found["violations"], f"{found['violations']} violations of a majorant that bounds")
