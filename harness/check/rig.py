@@ -129,6 +129,12 @@ class Rig:
         rig.seed = seed
         return rig
 
+    def without_scenes(self) -> Rig:
+        """The same rig with nothing kept of scenes: for what changes how they are made."""
+        rig = copy(self)
+        rig._kept = {}
+        return rig
+
     def with_arithmetic(self, name: str) -> Rig:
         """The same rig with another arithmetic of flights that do not name theirs."""
         rig = copy(self)

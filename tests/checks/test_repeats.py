@@ -53,6 +53,12 @@ def test_rays_of_other_estimands_and_media_do_not_share_references(rig):
     assert not np.allclose(usual, linear)
 
 
+def test_a_rig_without_scenes_makes_its_own(rig):
+    usual = flight(rig, 5, rays=FIXED)
+    assert flight(rig, 5, rays=FIXED).scene is usual.scene
+    assert flight(rig.without_scenes(), 5, rays=FIXED).scene is not usual.scene
+
+
 def test_given_lines_are_told_apart(rig):
     origins, up = np.array([[0.5, 0.5, -1.0]]), np.array([[0.0, 0.0, 1.0]])
     one = flight(rig, 5, lines=(origins, up))
