@@ -85,6 +85,11 @@ class Scene:
             lambda: source.combined_hash(self.medium.fingerprint, self.segments.tobytes()),
         )
 
+    @property
+    def depth(self) -> np.ndarray:
+        """The optical depth of each ray."""
+        return self._keep("depth", lambda: self.medium.optical_depth(self.segments))
+
     def reference(self, case: Case) -> np.ndarray | None:
         """The exact value of a case for each ray, (rays,) or (rays, channels); None without one."""
         if case.light is None:

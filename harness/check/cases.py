@@ -16,7 +16,8 @@ from freepath.check.identities import (
     check_weighted_free_path,
     roundings,
 )
-from freepath.check.rig import Flight, Rig, Samples
+from freepath.check.rig import Flight, Rig
+from freepath.check.samples import Samples
 from freepath.check.truth import depth_at
 from freepath.check.verdict import demand
 from freepath.stats import Moments
@@ -40,7 +41,7 @@ def check_samples(flight: Flight, samples: Samples, alpha: float) -> None:
     tracker, case = flight.tracker, flight.case
     check_clean(samples.round, bounded=case.majorant is not None and case.tightness >= 1)
     expected, moments = flight.reference(), samples.round.moments
-    depth = flight.medium.optical_depth(flight.segments)
+    depth = flight.depth
     if case.estimand == "transmittance":
         still = moments.m2 == 0.0  # next-flight and the like vary in empty space too
         check_empty(
@@ -86,7 +87,7 @@ def check_distribution(
     flight: Flight, samples: Samples, alpha: float, at_most: int | None = None
 ) -> None:
     """Free paths have the distribution that the medium gives them; `at_most` samples a ray."""
-    depth = flight.medium.optical_depth(flight.segments)
+    depth = flight.depth
     at = depth_at(flight.medium, flight.segments, samples.t[:, :at_most])
     weight, escaped = samples.weight[:, :at_most], samples.escaped[:, :at_most]
     if (weight == 1.0).all():
@@ -97,7 +98,7 @@ def check_distribution(
 
 def check_each_path(flight: Flight, samples: Samples, target: np.ndarray) -> None:
     """Free paths end where the optical depths that were sampled for them are reached."""
-    depth = flight.medium.optical_depth(flight.segments)
+    depth = flight.depth
     at = depth_at(flight.medium, flight.segments, samples.t)
     bound = flight.rounding * roundings(_pieces(flight)) * np.maximum(_largest_depth(flight), 1.0)
     check_inversion(at, target, samples.escaped, depth, bound)

@@ -34,7 +34,7 @@ def caught(rig: Rig, defect: Defect | HostDefect, check: Check) -> str:
     try:
         if isinstance(defect, HostDefect):
             with planted(defect) as function:
-                check.run(rig, LEVEL)
+                check.run(rig.without_scenes(), LEVEL)
             used = function.called
         else:
             change = Change(defect.old, defect.new)

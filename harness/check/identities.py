@@ -78,8 +78,9 @@ def check_variance(scores: Array, expected: Array, alpha: float) -> None:
     """
     count = scores.shape[1]
     deviation = scores - scores.mean(axis=1, keepdims=True)
-    square = (deviation**2).sum(axis=1) / (count - 1)
-    fourth = (deviation**4).mean(axis=1)
+    squares = deviation**2
+    square = squares.sum(axis=1) / (count - 1)
+    fourth = (squares**2).mean(axis=1)
     error = np.maximum(fourth - square**2 * (count - 3) / (count - 1), 0.0) / count
     _require_groups(square, expected, error, expected, (alpha, "variance"))
 
@@ -194,16 +195,21 @@ def check_weighted_free_path(
     share = np.expm1(-depth_at) / np.expm1(-depth[rays])[:, None]
     place = np.where(escaped, bins, np.clip(bins * share, 0, bins - 1).astype(int))
     escape = np.exp(-depth[rays])
-    p_values, noise = [], []
-    for number in range(bins + 1):
-        weights = np.where(place == number, weight, 0.0)
-        expected = escape if number == bins else (1.0 - escape) / bins
-        deviation = (weights.mean(axis=1) - expected).sum()
-        error = np.sqrt((weights.var(axis=1, ddof=1) / weights.shape[1]).sum())
-        noise.append(error / expected.sum())
-        p_values.append(2.0 * stats.norm.sf(abs(deviation) / error))
+    # of each ray: the sum of the weights that end in each bin, and of their squares
+    count, cells = weight.shape[1], (len(weight), bins + 1)
+    cell = (np.arange(len(weight))[:, None] * (bins + 1) + place).ravel()
+    total, squares = (
+        np.bincount(cell, values.ravel(), cells[0] * cells[1]).reshape(cells)
+        for values in (weight, weight**2)
+    )
+    variance = (squares - total**2 / count) / (count - 1)
+    expected = np.where(np.arange(bins + 1) < bins, (1.0 - escape)[:, None] / bins, escape[:, None])
+    deviation = (total / count - expected).sum(axis=0)
+    error = np.sqrt(variance.sum(axis=0) / count)
+    noise = error / expected.sum(axis=0)
+    p_values = 2.0 * stats.norm.sf(np.abs(deviation) / error)
     demand(np.median(noise) < 5.0 * RESOLVED, f"free path: bins known to {np.median(noise):.2g}")
-    require(np.array(p_values), alpha, "free path (weighted)")
+    require(p_values, alpha, "free path (weighted)")
 
 
 def check_same_samples(one: Array, other: Array, lookups: tuple[Array, Array], rounding: float):

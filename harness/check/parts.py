@@ -29,7 +29,8 @@ class Lanes:
         """Run `body`, which reads in0, in1, ... and writes out0, out1, ..., named after their type.
 
         `outputs` are the types of the results: bits or real; `draws` of each are asked for: the
-        body is in a loop over n.
+        body is in a loop over n. It may read `seed`, that of the rig: an argument, as a source of
+        each seed would be compiled in each repeat.
         """
         padded = -(-count // self._lanes) * self._lanes
         names = [f"in{i}" for i in range(len(inputs))] + [f"out{i}" for i in range(len(outputs))]
@@ -42,7 +43,7 @@ class Lanes:
         place = f"(at * {draws} + n * LANES)"
         store = "".join(self._store(f"out{i}", f"out{i}_", place) for i in range(len(outputs)))
         text = (
-            f"{self._head}\n__kernel void track({arguments})\n{{\n"
+            f"{self._head}\n__kernel void track({arguments}, const ulong seed)\n{{\n"
             f"const uint at = get_global_id(0) * LANES;\n{load}Rng rng;\n"
             f"for (uint n = 0; n < {draws}; ++n) {{\n{declare}{body}\n{store}}}\n}}\n"
         )
@@ -52,7 +53,8 @@ class Lanes:
         buffers = [device.upload(array) for array in arrays]
         size = 4 * padded * draws
         results = [device.allocate(size) for _ in outputs]
-        program.launch([*buffers, *results], padded // self._lanes, 1)
+        seed = np.uint64(self._rig.seed)
+        program.launch([*buffers, *results, seed], padded // self._lanes, 1)
         found = []
         for kind, result in zip(outputs, results, strict=True):
             dtype = {"bits": np.uint32, "real": np.float32}[kind]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -13,15 +14,19 @@ from freepath import binding, config, plan, source
 from freepath.binding import Scene
 from freepath.catalog import Catalog, Tracker
 from freepath.check.media import CHORDS, MAJORANTS, MEDIA
+from freepath.check.samples import Samples
 from freepath.check.verdict import NotApplicable
 from freepath.device import Device, Program, scalar_type
 from freepath.plan import Case
 from freepath.runner import KernelData, Round, Runner
-from freepath.scene import Medium, Sky, build_medium, path_reference, reference
+from freepath.scene import Medium, build_medium
 from freepath.scene import segments as inside
 from freepath.source import Source
 
+Lines = tuple[np.ndarray, np.ndarray]
 SEED = 20240229
+MOST_SCENES = 256
+"""Rays in their medium that are kept: more than the checks that share their kernels have."""
 
 
 @dataclass(frozen=True)
@@ -44,36 +49,33 @@ class Change:
 
 
 @dataclass(frozen=True)
-class Samples:
-    """Single samples, each array of the shape (rays, samples), and the round they came from."""
-
-    t: np.ndarray
-    weight: np.ndarray
-    escaped: np.ndarray
-    lookups: np.ndarray
-    score: np.ndarray
-    """What each contributes to the mean."""
-    round: Round
-    weights: np.ndarray
-    scores: np.ndarray
-    """Of each channel, (channels, rays, samples); those above are of the first."""
-
-
-@dataclass(frozen=True)
 class Flight:
     """A case that is built and ready to run."""
 
     case: Case
     tracker: Tracker
-    medium: Medium
-    segments: np.ndarray
-    """As the kernel reads them: in its precision, so that rounding of input is no error of it."""
+    scene: Scene
+    """With the rays as the kernel reads them, so that rounding of input is no error of it."""
     stored: Medium
     """The medium as the kernel reads it: with its voxels rounded to what is stored of them."""
     runner: Runner
     recording: bool
     """Whether the kernel writes every sample: then every run must give it the room."""
-    sky: Sky | None = None
+
+    @property
+    def medium(self) -> Medium:
+        """The medium as it is given."""
+        return self.scene.medium
+
+    @property
+    def segments(self) -> np.ndarray:
+        """In the precision of the kernel, (rays, 7)."""
+        return self.scene.segments
+
+    @property
+    def depth(self) -> np.ndarray:
+        """The optical depth of each ray."""
+        return self.scene.depth
 
     @property
     def rounding(self) -> float:
@@ -82,13 +84,11 @@ class Flight:
 
     def reference(self) -> np.ndarray:
         """The exact value of each ray."""
-        if self.case.light is not None:
-            return path_reference(self.case, self.medium, self.segments, self.sky)
-        return reference(self.case.estimand, self.medium, self.segments)
+        return self.scene.reference(self.case)
 
     def as_stored(self) -> Flight:
         """The same, held to the medium as it is stored."""
-        return replace(self, medium=self.stored)
+        return replace(self, scene=Scene(self.stored, self.segments))
 
     def run(self, samples: int, blocks: int = 1, **options: Any) -> Round:
         """Take samples of every ray, from number 0 on unless `first_sample` says otherwise."""
@@ -97,16 +97,7 @@ class Flight:
 
     def record(self, samples: int, blocks: int = 1, **options: Any) -> Samples:
         """Take samples and keep each."""
-        one = self.run(samples, blocks, **options)
-        width = one.recorded.shape[-1]
-        recorded = one.recorded.reshape(blocks, -1, samples, width).astype(np.float64)
-        values = np.moveaxis(recorded, (3, 1), (0, 1))
-        # lookups are a running count of each unit
-        values[3] = np.diff(values[3], axis=2, prepend=0.0)
-        values = values.reshape(width, -1, blocks * samples)
-        weights, scores = values[[1, *range(5, width, 2)]], values[4::2]
-        t, weight, escaped, lookups, score = values[:5]
-        return Samples(t, weight, escaped > 0, lookups, score, one, weights, scores)
+        return Samples(self.run(samples, blocks, **options), blocks, samples)
 
 
 class Rig:
@@ -122,17 +113,26 @@ class Rig:
         self._changes: tuple[Change, ...] = ()
         self._programs: dict[str, Program] = {}
         self._media: dict[str, Medium] = {}
+        self._cases: dict[str, Case] = {}
+        self._kept: dict[Any, tuple[Scene, Scene]] = {}
 
     def with_trackers(self, catalog: Catalog) -> Rig:
         """The same rig for another catalog; it shares what is built, as those below do."""
         rig = copy(self)
         rig.catalog = catalog
+        rig._cases = {}
         return rig
 
     def with_seed(self, seed: int) -> Rig:
         """The same rig with other random numbers."""
         rig = copy(self)
         rig.seed = seed
+        return rig
+
+    def without_scenes(self) -> Rig:
+        """The same rig with nothing kept of scenes: for what changes how they are made."""
+        rig = copy(self)
+        rig._kept = {}
         return rig
 
     def with_arithmetic(self, name: str) -> Rig:
@@ -168,32 +168,37 @@ class Rig:
         if self.device.info.loop_limit:
             # llvmpipe takes minutes to compile wider vectors than its own
             axes["lanes"] = self.device.info.lanes
-        # JSON is YAML
         seed = self.seed if seed is None else seed
-        text = json.dumps({"name": "check", "seed": seed, "rays": rays, "matrix": axes})
-        path = self.folder / "case.yaml"
-        path.write_text(text)
-        loaded = config.load(path, self.catalog.parameter_models())
-        (case,) = plan.expand(loaded, self.catalog)
+        # repeats differ by their seed alone
+        document = {"name": "check", "rays": rays, "matrix": axes}
+        key = json.dumps(document)
+        if key not in self._cases:
+            self._cases[key] = self._parsed(document | {"seed": seed})
+        case = replace(self._cases[key], seed=seed)
         if case.skip_reason:
             raise NotApplicable(case.skip_reason)
+        return case
+
+    def _parsed(self, document: dict[str, Any]) -> Case:
+        path = self.folder / "case.yaml"
+        # JSON is YAML
+        path.write_text(json.dumps(document))
+        loaded = config.load(path, self.catalog.parameter_models())
+        (case,) = plan.expand(loaded, self.catalog)
         return case
 
     def flight(
         self,
         *,
-        lines: tuple[np.ndarray, np.ndarray] | None = None,
+        lines: Lines | None = None,
         count: bool = True,
         record: bool = True,
         **axes: Any,
     ) -> Flight:
         """Build a case. `lines` are origins and directions of its rays, not random chords."""
         case = self.case(**axes)
-        key = str(case.medium.as_dict())
-        if key not in self._media:
-            self._media[key] = build_medium(case.medium)
-        medium = self._media[key]
-        scene = Scene(medium, inside(*lines, medium)) if lines else Scene.of(case, medium, [])
+        scene, read = self._scenes(case, lines)
+        medium = scene.medium
         structure = binding.structure_of(
             case, self.catalog, medium, self.device, count=count, record=record
         )
@@ -202,10 +207,34 @@ class Rig:
         voxels = stored.medium.data
         data = KernelData.upload(self.device, scene.segments, voxels, case.arithmetic)
         runner = binding.runner_of(case, structure, stored, self.program(text), data)
-        read = scene.segments.astype(scalar_type(case.arithmetic)).astype(np.float64)
         tracker = self.catalog.trackers[case.tracker]
-        sky = scene.sky(case)
-        return Flight(case, tracker, medium, read, stored.medium, runner, record, sky)
+        return Flight(case, tracker, read, stored.medium, runner, record)
+
+    def _scenes(self, case: Case, lines: Lines | None) -> tuple[Scene, Scene]:
+        """The scene of a case, and the same with its rays rounded as the kernel reads them."""
+        kind = str(case.medium.as_dict())
+        if kind not in self._media:
+            self._media[kind] = build_medium(case.medium)
+        medium = self._media[kind]
+        rays = str(case.rays.as_dict())
+        # no other rays are drawn: those are the same in every repeat, and so are their references
+        drawn = case.seed if case.rays.kind == "chords" else None
+        given = tuple(array.tobytes() for array in lines) if lines else (rays, drawn)
+
+        def make() -> tuple[Scene, Scene]:
+            scene = Scene(medium, inside(*lines, medium)) if lines else Scene.of(case, medium, [])
+            read = scene.segments.astype(scalar_type(case.arithmetic)).astype(np.float64)
+            return scene, Scene(medium, read)
+
+        return self._recent((kind, given, case.arithmetic), make)
+
+    def _recent(self, key: Any, make: Callable[[], Any]) -> Any:
+        """What was made for a key, unless much else has been asked for since."""
+        made = self._kept.pop(key) if key in self._kept else make()
+        self._kept[key] = made
+        if len(self._kept) > MOST_SCENES:
+            self._kept.pop(next(iter(self._kept)))
+        return made
 
     def program(self, text: Source) -> Program:
         """Build a source, each only once."""

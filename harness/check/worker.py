@@ -7,6 +7,7 @@ import tempfile
 import time
 import traceback
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -20,6 +21,7 @@ from freepath.check.verdict import Failure, NotApplicable
 from freepath.device import open_devices
 from freepath.drivers import INTERPRETER_LOG
 from freepath.errors import DriverLimitError, FreepathError
+from freepath.scene.cache import reading_only
 
 STRIDE = 1_000_003
 """Between the seeds of repeats: more than the checks add to them."""
@@ -59,7 +61,11 @@ def serve(connection: Connection, setting: Setting) -> None:
         connection.send("")
         while (task := connection.recv()) is not None:
             name, repeat = task
-            connection.send(run(rig.with_seed(setting.seed + STRIDE * repeat), checks[name]))
+            seeded = rig.with_seed(setting.seed + STRIDE * repeat)
+            # references of rays that are drawn once would fill the user's cache
+            with reading_only() if repeat else nullcontext():
+                answer = run(seeded, checks[name])
+            connection.send(answer)
 
 
 def run(rig: Rig, check: Check) -> tuple[str, float, str]:

@@ -6,11 +6,24 @@ import contextlib
 import hashlib
 import os
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextvars import ContextVar
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+
+_writing = ContextVar("writing", default=True)
+
+
+@contextlib.contextmanager
+def reading_only() -> Iterator[None]:
+    """Keep nothing more meanwhile: for what will not be asked for again."""
+    before = _writing.set(False)
+    try:
+        yield
+    finally:
+        _writing.reset(before)
 
 
 def cache_dir() -> Path:
@@ -33,8 +46,9 @@ def cached(name: str, compute: Callable[[], NDArray]) -> NDArray:
     array = _load(path, name)
     if array is None:
         array = compute()
-        with contextlib.suppress(OSError):
-            _store(path, name, array)
+        if _writing.get():
+            with contextlib.suppress(OSError):
+                _store(path, name, array)
     return array
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from typing import Any
 
 import numpy as np
@@ -84,7 +85,7 @@ def _single_scattering(case: Any, medium: Medium, segments: Array) -> Array:
     # a light on the line of a ray but not on the ray: from beside, by what no integral can tell
     off = np.maximum(off, 1e-7 * np.abs(nearest))
     low, high = np.arctan2(-nearest, off), np.arctan2(segments[:, 6] - nearest, off)
-    nodes, weights = np.polynomial.legendre.leggauss(POINTS)
+    nodes, weights = _rule()
     result = np.zeros(len(segments))
     for node, weight in zip(nodes, weights, strict=True):
         theta = low + (high - low) * (node + 1) / 2
@@ -99,6 +100,12 @@ def _single_scattering(case: Any, medium: Medium, segments: Array) -> Array:
         value = sigma * np.exp(-depth) * henyey_greenstein(case.medium.g, cosine)
         result += weight / 2 * (high - low) / off * value
     return result
+
+
+@functools.cache
+def _rule() -> tuple[Array, Array]:
+    """The Gauss-Legendre rule, which is dearer to set up than to use."""
+    return np.polynomial.legendre.leggauss(POINTS)
 
 
 def _way_out(points: Array, direction: Array, extent: Array) -> Array:

@@ -129,7 +129,7 @@ def free_path(rig: Rig, alpha: float, probability: str) -> None:
     samples = flight.record(SAMPLES)
     check_channels(samples.round.moments, flight.reference(), alpha / 2)
     ends = depth_at(flight.medium, flight.segments, samples.t)
-    whole, level = flight.medium.optical_depth(flight.segments), alpha / 2 / len(CHANNELS)
+    whole, level = flight.depth, alpha / 2 / len(CHANNELS)
     for factor, weight in zip(CHANNELS, samples.weights, strict=True):
         check_weighted_free_path(factor * ends, weight, samples.escaped, factor * whole, level)
 

@@ -141,7 +141,7 @@ def clamped_bias(rig: Rig, alpha: float, tracker: Tracker) -> None:
         axes["parameters"] = {"control": "number", "share": 0}
     flight = homogeneous(rig, tracker, 2.0, **axes)
     moments = flight.run(8192).moments
-    depth = flight.medium.optical_depth(flight.segments)
+    depth = flight.depth
     clamped = np.exp(-depth / 2.0)
     if moments.m2.any():
         check_mean(moments, clamped, alpha / 2)
@@ -165,7 +165,8 @@ def very_loose(rig: Rig, alpha: float, tracker: Tracker) -> None:
     """A million times too high: within a rounding for each collision, or cut off and counted."""
     rays = {"orthographic": {"resolution": 2}}
     flight = homogeneous(rig, tracker, 0.7, tightness=1e6, rays=rays)
-    samples = flight.record(8)
+    # blocks of one sample: those of a block would follow each other in one lane
+    samples = flight.record(1, blocks=8)
     found, expected = samples.round.counters, flight.reference()
     demand(not found["nonfinite"], "scores are no numbers")
     cut = found["truncated"]
@@ -184,7 +185,7 @@ def step_cap(rig: Rig, alpha: float, tracker: Tracker) -> None:
     """All paths, each after as many steps as the cap allows."""
     parameters = {"control": "number", "share": 0} if splits_off(tracker) else {}
     axes = {"tightness": 1e8, "rays": {"orthographic": {"resolution": 2}}}
-    one = homogeneous(rig, tracker, 1.0, parameters=parameters, **axes).run(2)
+    one = homogeneous(rig, tracker, 1.0, parameters=parameters, **axes).run(1, blocks=2)
     cut, steps = one.counters["truncated"], one.counters["steps"]
     demand(cut == one.samples, f"{cut} of {one.samples} paths counted as cut off")
     demand(steps == cut * STEP_CAP, f"{steps} steps, expected {cut * STEP_CAP}")

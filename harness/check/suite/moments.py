@@ -89,7 +89,7 @@ def _compare(flight: Flight, alpha: float, variance: Any, lookups: Any) -> None:
     samples = flight.record(SAMPLES)
     check_mean(samples.round.moments, flight.reference(), alpha / 3)
     check_count(samples.lookups, lookups, alpha / 3)
-    thin = flight.medium.optical_depth(flight.segments) <= THICKEST
+    thin = flight.depth <= THICKEST
     demand(np.count_nonzero(thin) > 100, "too few rays are thin enough")
     if variance is not None:
         check_variance(samples.score[thin], variance[thin], alpha / 3)
@@ -110,7 +110,7 @@ def _delta(flight: Flight) -> known.Expected:
 
 
 def _ratio(flight: Flight) -> known.Expected:
-    depth, majorant = flight.medium.optical_depth(flight.segments), _along(flight)
+    depth, majorant = flight.depth, _along(flight)
     variance = np.exp(-2.0 * depth) * np.expm1(majorant.square_over_majorant())
     return variance, majorant.tentative_collisions()
 

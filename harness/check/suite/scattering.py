@@ -246,7 +246,7 @@ def phase_function(rig: Rig, alpha: float, g: float) -> None:
     code = code.replace("scene->optics.g", f"((SCALAR){g!r})")
     lanes = Lanes(rig, 16, more=f"typedef int Scene;\n{code}")
     count, draws = 4096, 64
-    body = f"if (n == 0) rng = stream({rig.seed}ul, in0, 3ul, in1); "
+    body = "if (n == 0) rng = stream(seed, in0, 3ul, in1); "
     body += "const Scene *none = 0; out0 = sample_cosine(none, &rng); out1 = phase(none, out0);"
     ray = np.arange(count)
     drawn = lanes(body, [ray, ray % 3], ["real", "real"], count, draws)

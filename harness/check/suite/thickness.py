@@ -99,7 +99,7 @@ def relative(rig: Rig, alpha: float, tracker: Tracker, depth: float) -> None:
     axes = {"arithmetic": "double", "lanes": 4, "rays": UPWARD, "tightness": 1.0 / depth}
     flight = homogeneous(rig, tracker, depth, **axes)
     moments = flight.record(4096).round.moments
-    expected = -np.expm1(-flight.medium.optical_depth(flight.segments)).mean()
+    expected = -np.expm1(-flight.depth).mean()
     taken = (1.0 - moments.mean).mean()
     error = np.sqrt((moments.variance / moments.count).sum()) / len(moments.mean)
     # a rounding of T for each collision is the least that can be had
@@ -118,7 +118,8 @@ def huge(rig: Rig, alpha: float, tracker: Tracker) -> None:
 def thick(rig: Rig, alpha: float, tracker: Tracker, depth: float) -> None:
     """Nothing comes through, and nothing becomes infinite or no number."""
     rays = UPWARD if depth < 1e5 else {"orthographic": {"resolution": 1}}
-    one = homogeneous(rig, tracker, depth, rays=rays).record(16)
+    # blocks of one sample: those of a block would follow each other in one lane
+    one = homogeneous(rig, tracker, depth, rays=rays).record(1, blocks=16)
     found = one.round.counters
     demand(not found["nonfinite"], f"{found['nonfinite']} scores are no numbers")
     demand(not found["violations"], f"{found['violations']} violations of a majorant that bounds")

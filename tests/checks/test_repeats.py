@@ -1,0 +1,107 @@
+"""Repeats of a check share what no seed changes, and nothing else."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from freepath.check.media import MEDIA
+from freepath.check.parts import Lanes
+from freepath.check.rig import MOST_SCENES
+from freepath.check.truth import cut, depth_at
+from freepath.check.verdict import NotApplicable
+from freepath.scene import cache
+
+FIXED = {"orthographic": {"resolution": 4}}
+
+
+def flight(rig, seed, **axes):
+    return rig.with_seed(seed).flight(tracker="delta", **{"medium": "trilinear"} | axes)
+
+
+def test_a_case_of_a_repeat_differs_by_its_seed_alone(rig):
+    one, other = (
+        rig.with_seed(seed).case(tracker="ratio", medium="linear", tightness=2) for seed in (5, 6)
+    )
+    assert (one.seed, other.seed) == (5, 6)
+    assert dataclasses.replace(other, seed=5) == one
+
+
+def test_what_cannot_work_is_told_in_each_repeat(rig):
+    for seed in (5, 6):
+        with pytest.raises(NotApplicable):
+            rig.with_seed(seed).case(tracker="analytic", medium="trilinear")
+
+
+def test_rays_that_are_drawn_are_drawn_anew_for_each_seed(rig):
+    one, other = flight(rig, 5), flight(rig, 6)
+    assert not np.array_equal(one.segments, other.segments)
+    assert not np.array_equal(one.reference(), other.reference())
+    assert np.array_equal(other.reference(), np.exp(-other.depth))
+
+
+def test_rays_that_are_not_drawn_keep_their_references(rig):
+    one, other = flight(rig, 5, rays=FIXED), flight(rig, 6, rays=FIXED)
+    assert other.reference() is one.reference()
+    assert not np.array_equal(one.run(8).moments.mean, other.run(8).moments.mean)
+
+
+def test_rays_of_other_estimands_and_media_do_not_share_references(rig):
+    usual = flight(rig, 5, rays=FIXED).reference()
+    path = flight(rig, 5, rays=FIXED, estimand="free_path").reference()
+    linear = flight(rig, 5, rays=FIXED, medium="linear").reference()
+    assert not np.allclose(usual, path)
+    assert not np.allclose(usual, linear)
+
+
+def test_a_rig_without_scenes_makes_its_own(rig):
+    usual = flight(rig, 5, rays=FIXED)
+    assert flight(rig, 5, rays=FIXED).scene is usual.scene
+    assert flight(rig.without_scenes(), 5, rays=FIXED).scene is not usual.scene
+
+
+def test_given_lines_are_told_apart(rig):
+    origins, up = np.array([[0.5, 0.5, -1.0]]), np.array([[0.0, 0.0, 1.0]])
+    one = flight(rig, 5, lines=(origins, up))
+    other = flight(rig, 5, lines=(origins + [0.2, 0.0, 0.0], up))
+    assert one.reference() != other.reference()
+
+
+def test_repeats_do_not_pile_up(rig):
+    for seed in range(MOST_SCENES + 8):
+        flight(rig, seed, medium="homogeneous", rays={"chords": {"count": 1}})
+    assert len(rig._kept) <= MOST_SCENES
+    programs, cases = len(rig._programs), len(rig._cases)
+    flight(rig, MOST_SCENES + 9, medium="homogeneous", rays={"chords": {"count": 1}})
+    assert (len(rig._programs), len(rig._cases)) == (programs, cases)
+
+
+def test_a_part_reads_the_seed_without_being_compiled_again(rig):
+    drawn = []
+    for seed in (5, 2**63 + 5):
+        body = "rng = stream(seed, in0, 0ul, in0); out0 = rng.s0;"
+        (words,) = Lanes(rig.with_seed(seed), 1)(body, [np.arange(8)], ["bits"], 8)
+        drawn.append((words, len(rig._programs)))
+    assert not np.array_equal(drawn[0][0], drawn[1][0])
+    assert drawn[0][1] == drawn[1][1]
+
+
+@pytest.mark.parametrize("medium", MEDIA)
+def test_the_depth_at_a_distance_is_that_of_the_ray_up_to_there(rig, medium):
+    made = flight(rig, 5, medium=medium)
+    length = made.segments[:, 6:]
+    share = np.concatenate([np.random.default_rng(2).random(29), [0.0, 1.0, 1.001, -0.1, np.nan]])
+    t = share * length
+    t[:, 7] = made.medium.pieces(made.segments).start[:, -1]
+    expected = [made.medium.optical_depth(cut(made.segments, at)) for at in t.T]
+    found = depth_at(made.medium, made.segments, t)
+    np.testing.assert_allclose(found, np.transpose(expected), rtol=1e-13, atol=1e-15)
+
+
+def test_nothing_is_written_while_the_cache_is_only_read(tmp_path, monkeypatch):
+    monkeypatch.setenv("FREEPATH_CACHE", str(tmp_path))
+    with cache.reading_only():
+        assert cache.cached("one", lambda: np.arange(3)).tolist() == [0, 1, 2]
+        assert not list(tmp_path.iterdir())
+    cache.cached("one", lambda: np.arange(4))
+    with cache.reading_only():
+        assert cache.cached("one", lambda: np.arange(3)).tolist() == [0, 1, 2, 3]
