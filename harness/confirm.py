@@ -27,7 +27,7 @@ from freepath.stats import relative_half_width
 BUDGET_S = 0.32
 """Device time for each sample count, and the rounds that they take turns with."""
 TURNS = 8
-MOST = 4
+MOST = 8
 """So many times that is spent where errors or times are not settled by then."""
 SETTLED = 0.05
 """Half-width of the 95 % interval of an error, relative; and how far times of every other turn may

@@ -11,7 +11,7 @@ from freepath.stats import relative_half_width
 PILOT_ROUNDS = 5
 """Rounds after which the number that the wanted error needs is fixed: stopping as soon as an
 estimate looks precise would favour lucky ones."""
-PATIENCE = 10.0
+PATIENCE = 20.0
 """Of a case whose prediction is to be confirmed."""
 
 
