@@ -93,10 +93,15 @@ def test_what_is_too_large_is_named():
         grid(values).stored("half")
     told = str(error.value)
     assert told.startswith("a.npy: 2 voxels are too large for storage half, which ends at 65504")
-    assert "[z, y, x] = [1, 2, 1], extinction 65520, largest 2e+06" in told
+    assert "[z, y, x] = [1, 2, 1]: extinction 65520, largest 2e+06" in told
     # what it advises works
     (unit,) = set(re.findall(r"sigma_t / (\d+)", told))
     assert np.isfinite(grid(values / int(unit)).stored("half").voxels).all()
+
+
+def test_a_voxel_that_stands_for_two_is_counted_once():
+    with pytest.raises(VolumeError, match=r"1 voxels are .* \(first \[z, y, x\] = \[0, 1, 0\]: "):
+        grid([[[1.0], [1e5], [2.0]]], "trilinear").stored("half")
 
 
 def test_a_run_is_refused_before_anything_is_measured(work, capsys, selector):
