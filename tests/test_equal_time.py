@@ -52,6 +52,42 @@ def test_a_run_leaves_pictures_whose_noise_is_that_of_their_time(result):
         assert abs((z**2).mean() - 1) < 6 * np.sqrt((z**2).var() / z.size)
 
 
+def equal_time_of(folder, row):
+    return pictures.read_exr(folder / f"{pictures.stem(row)}.exr")[0]["freepath:equal_time_s"]
+
+
+@pytest.mark.parametrize("folder", [pictures.FOLDER, pictures.EQUAL_TIME])
+def test_a_picture_that_is_gone_is_made_again(result, selector, capsys, folder):
+    before = sorted(read_rows(result / "summary.csv"), key=lambda row: row["scatterings"])
+    (result / folder / f"{pictures.stem(before[2])}.exr").unlink()
+    at_equal_time = result / pictures.EQUAL_TIME
+    set_before = equal_time_of(at_equal_time, before[3])
+
+    capsys.readouterr()
+    assert cli.main(["run", "x.yaml", "-d", selector, "-o", "out", "--resume"]) == 0
+    after = {row["case_id"]: row for row in read_rows(result / "summary.csv")}
+    assert len(after) == 4
+    again = [row for row in before if row["run_id"] != after[row["case_id"]]["run_id"]]
+    assert again == [before[2]]
+    # at the time that the others have, however long a sample took this time
+    assert {equal_time_of(at_equal_time, row) for row in before[2:]} == {set_before}
+    for part in (pictures.FOLDER, pictures.EQUAL_TIME):
+        assert (result / part / f"{pictures.stem(before[2])}.exr").is_file()
+
+    capsys.readouterr()
+    assert cli.main(["run", "x.yaml", "-d", selector, "-o", "out", "--resume"]) == 0
+    assert "nothing was left to run" in capsys.readouterr().out
+
+
+def test_pictures_that_are_asked_for_later_are_made(work, selector):
+    (work / "x.yaml").write_text(CONFIG.replace("render: true", "render: false"))
+    run = ["run", "x.yaml", "-d", selector, "-o", "out"]
+    assert cli.main(run) == 0
+    (work / "x.yaml").write_text(CONFIG)
+    assert cli.main([*run, "--resume"]) == 0
+    assert len(list(Path("out/pictures/equal-time").glob("*.exr"))) == 4
+
+
 def test_a_question_is_one_panel_with_errors(result):
     found = panels(load([result]))
     assert len(found) == 2  # one scattering and two have different answers
