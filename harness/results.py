@@ -143,6 +143,11 @@ class ResultFolder:
         """Whether the folder holds this run, so that it can be gone on with."""
         return self._lock is not None
 
+    @property
+    def holds_rows(self) -> bool:
+        """Whether there is a summary, by whichever process it was written."""
+        return (self.folder / SUMMARY).exists()
+
     def close(self) -> None:
         """Let others write here."""
         if self._lock:
