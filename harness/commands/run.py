@@ -57,7 +57,7 @@ def add(commands: Any) -> None:
         "--resume",
         action="store_true",
         help="go on with the run in DIR (default: the newest of this config): rows whose config, "
-        "source, device and driver are unchanged are kept",
+        "source, device and driver are unchanged are kept, if pictures that were wanted are there",
     )
     run.add_argument(
         "--confirm",
