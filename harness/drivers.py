@@ -232,7 +232,9 @@ def in_process_of(
 
 
 def how_it_ended(driver: Driver, code: int) -> str:
-    """What to tell of a driver's process that a signal ended, such as a crash of the driver."""
+    """What to tell of a driver's process that failed; a crash of the driver ends it by a signal."""
+    if code >= 0:
+        return f"{driver.name}: its process ended with exit code {code}"
     try:
         name = signal.Signals(-code).name
     except ValueError:

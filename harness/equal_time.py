@@ -7,14 +7,24 @@ these, which tells what the picture should be.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from freepath.errors import FreepathError
 from freepath.measure import Bench, shape_of
-from freepath.pictures import EQUAL_TIME, attributes_of, has_picture, picture, stem, write_exr
+from freepath.pictures import (
+    EQUAL_TIME,
+    attributes_of,
+    has_picture,
+    picture,
+    read_exr,
+    stem,
+    write_exr,
+)
+from freepath.results import Row
 
 LOG = "pictures.log"
 """Within the folder of a run, where something went wrong."""
@@ -22,6 +32,8 @@ VISIBLE = 0.05
 """Relative RMSE of a pixel of the best case: noise that is seen."""
 SHARE = 0.1
 """Of the best case's time it was measured in, at most: its mean has to tell what is an error."""
+QUESTION = ("device", "platform", "medium", "channels", "estimand", "light", "scatterings")
+"""Columns that cases have in common whose pictures are compared."""
 LEAST_SAMPLES = 4
 """Of the slowest case: with fewer, times are equal but roughly."""
 
@@ -50,21 +62,36 @@ def _visible(row: dict[str, Any]) -> float:
     return row["time_per_sample_s"] * min(needed, SHARE * row["samples_per_ray"])
 
 
-def render(folder: Path, shots: Sequence[Shot]) -> list[str]:
+def render(folder: Path, shots: Sequence[Shot], rows: Sequence[Row] = ()) -> list[str]:
     """Write a picture of each case of one scene and device; returns what went wrong.
 
-    Raises RunError where a launch fails.
+    `rows` are all of the run's: cases that a run which is gone on with had measured before have
+    set the time already. Raises RunError where a launch fails.
     """
     told = []
     groups: dict[tuple[str, ...], list[Shot]] = {}
     for shot in shots:
         if has_picture(shot.rays, shot.row["rays"]):
-            key = tuple(str(shot.row[name]) for name in ("estimand", "light", "scatterings"))
-            groups.setdefault(key, []).append(shot)
-    for group in groups.values():
-        seconds = seconds_of([shot.row for shot in group])
+            groups.setdefault(_question(shot.row), []).append(shot)
+    for question, group in groups.items():
+        new = {shot.row["case_id"] for shot in group}
+        others = [r for r in rows if _question(r) == question and r["case_id"] not in new]
+        seconds = _seconds_before(folder, others) or seconds_of([shot.row for shot in group])
         told += filter(None, (_render(folder, shot, seconds) for shot in group))
     return told
+
+
+def _question(row: Mapping[str, Any]) -> tuple[str, ...]:
+    return tuple(str(row[name]) for name in QUESTION)
+
+
+def _seconds_before(folder: Path, rows: Sequence[Row]) -> float | None:
+    """The time that pictures of these rows were given; None if they have none that tells."""
+    for row in rows:
+        with suppress(FreepathError, KeyError, ValueError):
+            told, _ = read_exr(folder / EQUAL_TIME / f"{stem(row)}.exr")
+            return float(told["freepath:equal_time_s"])
+    return None
 
 
 def _render(folder: Path, shot: Shot, seconds: float) -> str:

@@ -19,6 +19,8 @@ FOLDER = "pictures"
 """Within the folder of a run."""
 EQUAL_TIME = f"{FOLDER}/equal-time"
 """Those of cases that had the same device time."""
+COMPARED = ("ok", "mismatch")
+"""Statuses of cases that have a picture at equal time."""
 CAMERAS = ("orthographic", "perspective")
 """The kinds of rays that have a picture."""
 COLOURS = ("R", "G", "B")
@@ -74,6 +76,14 @@ def write_pictures(folder: Path, row: Mapping[str, Any], rays: Any, moments: Mom
     except FreepathError as problem:
         return f"no picture: {problem}"
     return ""
+
+
+def are_there(folder: Path, row: Mapping[str, str], rays: Any) -> bool:
+    """Whether a row of the folder's CSV has all of its pictures that `render` asks for."""
+    if row["status"] not in COMPARED or not has_picture(rays, int(row["rays"])):
+        return True
+    name = f"{stem(row)}.exr"
+    return all((folder / part / name).is_file() for part in (FOLDER, EQUAL_TIME))
 
 
 def has_picture(rays: Any, count: int) -> bool:

@@ -6,7 +6,7 @@ import csv
 import json
 import math
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -93,17 +93,21 @@ class ResultFolder:
                 "go on with that run by --resume, or name another folder"
             )
 
-    def open(self, planned: Sequence[Mapping[str, Any]]) -> set[tuple[str, ...]]:
+    def open(
+        self, planned: Sequence[Mapping[str, Any]], whole: Callable[[Row], bool] = lambda row: True
+    ) -> set[tuple[str, ...]]:
         """Make the folder, or take it over: rows that stand stay, rows to be made anew go.
 
         `planned` holds at least the KEY columns of every row that is wanted; returns the keys of
-        those that are there already. Rows of other cases and devices are left alone.
+        those that are there already. Rows of other cases and devices are left alone. `whole` tells
+        whether all files of a row are there; without them it does not stand.
         """
         wanted, places = {key_of(row) for row in planned}, {_of(row, PLACE) for row in planned}
 
         def stands(row: Row) -> bool:
             confirmed = needed is None or row["status"] != "ok" or _of(row, SESSION) in needed
-            return key_of(row) in wanted and row["status"] in FINAL and confirmed
+            final = row["status"] in FINAL and confirmed
+            return key_of(row) in wanted and final and whole(row)
 
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
@@ -138,6 +142,11 @@ class ResultFolder:
     def is_open(self) -> bool:
         """Whether the folder holds this run, so that it can be gone on with."""
         return self._lock is not None
+
+    @property
+    def holds_rows(self) -> bool:
+        """Whether there is a summary, by whichever process it was written."""
+        return (self.folder / SUMMARY).exists()
 
     def close(self) -> None:
         """Let others write here."""

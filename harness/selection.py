@@ -62,6 +62,30 @@ def _meant(selector: str, here: list[DeviceInfo]) -> tuple[list[Driver], bool]:
     return wanted, True
 
 
+def planned(parts: Parts) -> list[list[DeviceInfo]]:
+    """The devices that each part means, as its process sees them; none of one that crashes.
+
+    Raises DeviceError where two drivers have a device of the same name on platforms of the same
+    name: rows are known by these, and those of one would take the place of the other's.
+    """
+    probed = probe([driver for driver, _ in parts])
+    found = [
+        [info for info in infos if any(matches(info, one) for one in selectors)]
+        for (_, selectors), infos in zip(parts, probed, strict=True)
+    ]
+    owners: dict[tuple[str, str], tuple[Driver, DeviceInfo]] = {}
+    for (driver, _), infos in zip(parts, found, strict=True):
+        for info in infos:
+            other, known = owners.setdefault((info.name, info.platform), (driver, info))
+            if other is not driver:
+                raise DeviceError(
+                    f"{other.name} and {driver.name} differ by the driver's version alone, and a "
+                    f"result tells devices apart by name and platform: {known.label}, {info.label}"
+                    "; run each into a folder of its own"
+                )
+    return found
+
+
 def everywhere(here: list[DeviceInfo]) -> list[Driver]:
     """All drivers that are installed, and OTHERS if the system has devices of no known one."""
     others = [OTHERS] if OTHERS in _owners(here) else []

@@ -18,6 +18,7 @@ from freepath.catalog import Catalog
 from freepath.config import Config
 from freepath.device import Device
 from freepath.errors import FreepathError
+from freepath.pictures import are_there
 from freepath.plan import Case
 from freepath.results import SCHEMA_VERSION, ResultFolder, key_of
 from freepath.scene import build_medium
@@ -124,7 +125,7 @@ class Run:
         scenes = build_scenes(self.cases, search_path(self.config))
         plans = [(sweep, self._plan(sweep, scenes)) for sweep in map(self._sweep, devices)]
         jobs = [job for _, plan in plans for job in plan]
-        done = self.folder.open([job.row for job in jobs])
+        done = self.folder.open([job.row for job in jobs], self._is_whole)
         self.total = sum(key_of(job.row) not in done for job in jobs)
         if not self.total:
             self.folder.close()
@@ -143,6 +144,11 @@ class Run:
         finally:
             self._write(facts, session | {"ended": ended, **self.clock.as_dict()})
             self.folder.close()
+
+    def _is_whole(self, row: dict[str, str]) -> bool:
+        """Whether the pictures of a row are there, where the config wants them."""
+        rays = self.cases[0].rays  # all cases of a config fly the same
+        return not self.config.render or are_there(self.folder.folder, row, rays)
 
     def _sweep(self, device: Device) -> Sweep:
         told = self._done, self._progress

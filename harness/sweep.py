@@ -13,7 +13,7 @@ from freepath.confirm import SETTLED, confirmed_rows
 from freepath.device import Device, Program
 from freepath.errors import BuildError, DriverLimitError, FreepathError, RunError
 from freepath.measure import Bench, interleave
-from freepath.pictures import write_pictures
+from freepath.pictures import COMPARED, write_pictures
 from freepath.plan import Case
 from freepath.results import ResultFolder
 from freepath.rows import base_row, effects_of, measured_row, round_rows
@@ -176,7 +176,7 @@ class Sweep:
             return
         self.on_progress(0.0, "pictures at equal time")
         try:
-            told = equal_time.render(self.folder.folder, shots)
+            told = equal_time.render(self.folder.folder, shots, self.folder.rows())
         except RunError as error:
             told = [str(error)]
         if told:
@@ -192,7 +192,7 @@ class Sweep:
         if self.render:
             wrong = write_pictures(self.folder.folder, row, job.case.rays, found.moments)
             row["reason"] = "; ".join(filter(None, (row["reason"], wrong)))
-            if row["status"] in ("ok", "mismatch"):
+            if row["status"] in COMPARED:
                 self._shots.append(
                     equal_time.Shot(row, job.bench, job.case.rays, self._unbiased(job))
                 )

@@ -1,3 +1,4 @@
+import dataclasses
 import json
 import os
 import re
@@ -8,9 +9,10 @@ import sys
 import time
 
 import pytest
-from freepath import cli, drivers
+from freepath import cli, drivers, selection
 from freepath import device as devices
 from freepath.commands.listing import LISTS
+from freepath.drivers import Driver
 from freepath.results import read_rows
 
 SWEEP = """\
@@ -282,6 +284,46 @@ def test_a_run_on_all_devices_has_rows_and_a_table_of_each(call, work):
     code, out, err = call("run", "small.yaml", "-R", "regular", "-d", "all", "-o", "out")
     assert code == 2
     assert "already holds" in err
+
+
+DIES = """\
+import os, sys
+words = sys.argv[1:]
+if "devices" in words:
+    os.execv(words[0], words)
+from freepath import cli
+from freepath.results import ResultFolder
+append = ResultFolder.append
+def once(*given):
+    append(*given)
+    os.abort()
+ResultFolder.append = once
+cli.main(words[3:])
+"""
+
+
+def test_what_a_driver_that_crashed_did_not_finish_is_told(call, work, monkeypatch):
+    there = drivers.installed()
+    if not there:
+        pytest.skip("no known driver is installed")
+    dying = dataclasses.replace(there[0], prefix=(sys.executable, "-c", DIES))
+    mute = Driver("mute", "A driver", "", (), lambda: "yes", prefix=(sys.executable, "-c", "1/0"))
+    parts = [(mute, ["all"]), (dying, ["all"])]
+    monkeypatch.setattr(selection, "processes_of", lambda _: parts)
+    code, out, err = call("run", "small.yaml", "-d", "all", "-o", "out")
+    assert code == 8
+    assert "mute: its process ended with exit code 1" in err
+    assert "mute: it showed no device, so that none of 2 cases was run" in err
+    assert f"{dying.name}: its process was ended by SIGABRT" in err
+    assert f"{dying.name}: 1 of 2 cases were not finished on " in err
+    (row,) = read_rows(work / "out" / "summary.csv")
+    left = next(name for name in ("regular", "analytic") if name != row["tracker"])
+    assert re.search(rf"not finished on .*: [^,]*/{left}/[^,]*$", err, re.MULTILINE)
+    assert "same command and -o out --resume" in err
+    assert row["case"].split("/")[1] in out
+    # and nothing at all is no result, nor a mistake of the user's
+    parts[:] = [(mute, ["all"])]
+    assert call("run", "small.yaml", "-d", "all", "-o", "none")[0] == 8
 
 
 def test_the_source_of_a_case(call, selector):

@@ -97,6 +97,7 @@ def test_a_process_is_waited_for_captured_and_given_up():
     crash = made_up(prefix=(sys.executable, "-c", "import os; os.abort()"))
     code = drivers.in_process_of(crash, [], capture=True).returncode
     assert drivers.how_it_ended(crash, code) == "made-up: its process was ended by SIGABRT"
+    assert drivers.how_it_ended(crash, 2) == "made-up: its process ended with exit code 2"
 
 
 WAITS = """
@@ -160,6 +161,21 @@ def test_a_device_that_is_seen_in_another_process_only(monkeypatch, device):
     assert selection.processes_of(["cray"]) == [(hidden, ["all"])]
     with pytest.raises(DeviceError, match=r"no OpenCL device matches 'cray-2'.*\n(.*\n)*.*Cray-1"):
         selection.processes_of(["cray-2"])
+
+
+def test_drivers_that_differ_by_their_version_alone_are_refused(monkeypatch, device):
+    one, two = made_up("one"), made_up("two")
+    versions = {one: "1.0", two: "2.0"}
+
+    def probe(wanted):
+        given = vars(device.info)
+        return [[type(device.info)(**given | {"driver_version": versions[d]})] for d in wanted]
+
+    monkeypatch.setattr(selection, "probe", probe)
+    with pytest.raises(DeviceError, match=r"^one and two differ by .* 1\.0\), .* 2\.0\); run each"):
+        selection.planned([(one, ["all"]), (two, ["all"])])
+    # what is not selected is in nobody's way
+    assert [len(infos) for infos in selection.planned([(one, ["all"]), (two, ["cray"])])] == [1, 0]
 
 
 def test_probing_tells_nothing_of_what_crashes_or_babbles():

@@ -119,6 +119,39 @@ def test_every_chart_is_drawn(result, tmp_path, chart):
     assert "<script" not in (tmp_path / "p.svg").read_text()
 
 
+def drawn_lines(panel):
+    return next(layer for layer in panel["layer"] if layer["mark"]["type"] == "line")["encoding"]
+
+
+@pytest.mark.parametrize("chart", ["cost", "tightness-time", "pareto"])
+def test_devices_differ_in_their_lines(tmp_path, chart):
+    name = "pthread-a processor with a long name"
+    versions = ("3.0-rc2 of a wheel", "3.1 of a distribution")
+    rows = [
+        row_of(10 * i + j, tracker, j + 1.0, device=name, platform=platform, driver_version=version)
+        for i, (tracker, version) in enumerate(itertools.product(("delta", "ratio"), versions))
+        for j, platform in enumerate(["Portable Computing Language"] * 2)
+    ]
+    report = load([result_of(tmp_path / "two", rows)])
+    (panel,) = picture(report, chart).to_dict()["concat"]
+    dash = drawn_lines(panel)["strokeDash"]
+    assert dash["field"] == "device"
+    assert dash["scale"]["domain"] == report.values("device")
+    assert dash["scale"]["range"][0] != dash["scale"]["range"][1]
+    # cut as they are for a legend, names still differ
+    cut = json.loads(dash["legend"]["labelExpr"].removesuffix("[datum.label]").strip("()"))
+    assert list(cut) == report.values("device")
+    assert len(set(cut.values())) == 2
+    assert all(len(shown) < 50 for shown in cut.values())
+    svg = tmp_path / "p.svg"
+    write([tmp_path / "two"], svg, None, chart)
+    assert all(shown in svg.read_text() for shown in cut.values())
+    # a single device leaves the dashes to the majorants, and needs no legend
+    alone = load([result_of(tmp_path / "one", [r for r in rows if r["driver_version"][2] == "0"])])
+    (panel,) = picture(alone, chart).to_dict()["concat"]
+    assert drawn_lines(panel).get("strokeDash", {}).get("field") != "device"
+
+
 def test_lights_are_told_apart_and_shown_side_by_side(tmp_path, result):
     places = ("point-0.5x0.5x2", "point-0.5x0.5x9")
     rows = [

@@ -50,7 +50,5 @@ def run(
             code = drivers.in_process_of(driver, command).returncode
             if path.exists():
                 yield *read(path), code
-            elif code < 0:
-                yield {}, [drivers.how_it_ended(driver, code)], FAILED
             else:
-                yield {}, [f"{driver.name}: its process ended with exit code {code}"], code
+                yield {}, [drivers.how_it_ended(driver, code)], FAILED if code < 0 else code

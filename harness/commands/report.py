@@ -5,9 +5,12 @@ from __future__ import annotations
 import sys
 from argparse import Namespace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import shtab
+
+if TYPE_CHECKING:
+    from freepath.report import Report
 
 
 def add(commands: Any) -> None:
@@ -53,12 +56,19 @@ def execute(options: Namespace) -> int:
 
     markdown = options.format == "md" and not options.output
     if markdown or options.output == report.STANDARD_OUTPUT:
-        _, data, _ = report.made(options.result, options.output, options.format, options.chart)
+        found, data, _ = report.made(options.result, options.output, options.format, options.chart)
         sys.stdout.flush()
         sys.stdout.buffer.write(data)
+        _say_what_is_left_out(found)
         return 0
     found, path = report.write(options.result, options.output, options.format, options.chart)
     console = console_of()
     console.print(summary(found))
     console.print(f"wrote {path}", highlight=False, markup=False, soft_wrap=True)
+    _say_what_is_left_out(found)
     return 0
+
+
+def _say_what_is_left_out(found: Report) -> None:
+    for one in found.left_out:
+        print(f"freepath: left out: {one}", file=sys.stderr)

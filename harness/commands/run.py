@@ -18,11 +18,16 @@ from freepath.commands.common import cases_of, console_of
 from freepath.errors import FAILED, INTERRUPTED
 
 if TYPE_CHECKING:
+    from freepath.device import DeviceInfo
+    from freepath.drivers import Driver
     from freepath.plan import Case
     from freepath.results import ResultFolder
     from freepath.selection import Parts
     from freepath.session import Run
     from rich.console import Console
+
+NAMED = 3
+"""Cases of a driver that are named where it did not finish them; of more, only the number."""
 
 
 def add(commands: Any) -> None:
@@ -52,7 +57,7 @@ def add(commands: Any) -> None:
         "--resume",
         action="store_true",
         help="go on with the run in DIR (default: the newest of this config): rows whose config, "
-        "source, device and driver are unchanged are kept",
+        "source, device and driver are unchanged are kept, if pictures that were wanted are there",
     )
     run.add_argument(
         "--confirm",
@@ -82,8 +87,9 @@ def execute(options: Namespace) -> int:
     )
     folder = _folder(path, options)
     if parts:
-        crashed = _run_in_processes(options, parts, folder)
-        return max(_show(options, folder, cases, load), FAILED if crashed else 0)
+        failed = _run_in_processes(options, parts, folder, cases)
+        shown = _show(options, folder, cases, load) if folder.holds_rows else 0
+        return max(shown, FAILED if failed else 0)
     console = console_of(stderr=options.json)
     with _shown_progress(console) as (on_done, on_progress):
         clock, told = session.Clock(started), (on_done, on_progress)
@@ -98,18 +104,19 @@ def execute(options: Namespace) -> int:
     return _show(options, folder, cases, load, sweep)
 
 
-def _run_in_processes(options: Namespace, parts: Parts, folder: ResultFolder) -> bool:
+def _run_in_processes(
+    options: Namespace, parts: Parts, folder: ResultFolder, cases: list[Case]
+) -> bool:
     """Run each driver's devices in its process, one after the other, into one folder.
 
     Tells whether one of them crashed or could not do what was wanted; the others still run.
     """
-    from freepath import drivers
-    from freepath.results import SUMMARY
+    from freepath import drivers, selection
 
     failed = False
-    for driver, selectors in parts:
+    for (driver, selectors), infos in zip(parts, selection.planned(parts), strict=True):
         arguments = ["run", options.config, "-o", str(folder.folder), "--rows-only"]
-        if options.resume or (folder.folder / SUMMARY).exists():
+        if options.resume or folder.holds_rows:
             arguments.append("--resume")
         arguments += ["--json"] * options.json + ["--confirm"] * options.confirm
         for flag, values in (("-d", selectors), ("-a", options.axis), ("-R", [options.include])):
@@ -121,10 +128,33 @@ def _run_in_processes(options: Namespace, parts: Parts, folder: ResultFolder) ->
         code = drivers.in_process_of(driver, arguments).returncode
         if code == INTERRUPTED:
             raise KeyboardInterrupt
-        if code < 0:
+        if code != 0:
             print(f"freepath: {drivers.how_it_ended(driver, code)}", file=sys.stderr)
+            _say_what_is_missing(driver, infos, cases, folder)
         failed |= code != 0
     return failed
+
+
+def _say_what_is_missing(
+    driver: Driver, infos: list[DeviceInfo], cases: list[Case], folder: ResultFolder
+) -> None:
+    """Which cases have no row of a driver whose process ended too early."""
+    columns = ("case_id", "device", "platform", "driver_version")
+    rows = folder.rows() if folder.holds_rows else []
+    done = {tuple(row[column] for column in columns) for row in rows}
+    for info in infos:
+        place = (info.name, info.platform, info.driver_version)
+        missing = [case.name for case in cases if (case.case_id, *place) not in done]
+        if missing:
+            names = ", ".join(missing[:NAMED]) + ", ..." * (len(missing) > NAMED)
+            told = f"{len(missing)} of {len(cases)} cases were not finished on {info.label}"
+            print(f"freepath: {driver.name}: {told}: {names}", file=sys.stderr)
+    if not infos:
+        told = f"it showed no device, so that none of {len(cases)} cases was run"
+        print(f"freepath: {driver.name}: {told}", file=sys.stderr)
+    if rows:
+        told = f"go on with the same command and -o {folder.folder} --resume"
+        print(f"freepath: {driver.name}: {told}", file=sys.stderr)
 
 
 def _show(

@@ -3,21 +3,25 @@
 from pathlib import Path
 from typing import Annotated, Any
 
-from freepath.config.base import Kind, Model, OneOf
+from freepath.config.base import UNKNOWN_KEY, Kind, Model, OneOf
 from freepath.config.document import Document, Location, path_text
 from freepath.config.lights import LIGHTS, Uniform
 from freepath.config.models import MAJORANTS, MEDIA, Fraction, Global, Seed
 from freepath.config.quantity import CountOr, Number
 from freepath.config.rays import RAYS, Orthographic
-from freepath.config.rules import Choice, Flag, OneOrMore, Text, expected
+from freepath.config.rules import Choice, Flag, OneOrMore, Text, expected, failure
 from freepath.errors import Problem
 from pydantic import (
+    ConfigDict,
     Field,
     PrivateAttr,
     SerializerFunctionWrapHandler,
+    ValidationError,
+    ValidatorFunctionWrapHandler,
     model_serializer,
     model_validator,
 )
+from pydantic_core import InitErrorDetails
 
 ESTIMANDS = ("transmittance", "free_path", "radiance", "path_length", "mean_extinction")
 ALONG_PATHS = ("radiance", "path_length")
@@ -137,8 +141,19 @@ class Exclude(Entry):
     storage: Storages = Field(None)
 
 
+PRECISELY, EXACTLY = ("error", "time_noise", "at_most"), ("samples", "rounds")
+"""The keys of the two ways to stop; one of the other way would say nothing."""
+
+
 class Stop(Model):
     """When a case has been measured well enough: both precisions reached, or the time is up."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "dependentRequired": {"rounds": ["samples"]},
+            "dependentSchemas": {"samples": {"properties": dict.fromkeys(PRECISELY, False)}},
+        }
+    )
 
     error: Fraction = 0.01
     """Half-width of the 95 % interval of the RMSE of one sample, relative to it."""
@@ -150,6 +165,29 @@ class Stop(Model):
     """Exactly so many samples for each ray, instead of the rules above."""
     rounds: Annotated[int, Number("count", minimum=2, maximum=10_000)] = 10
     """How many rounds these samples are taken in, at least; the same layout in every run."""
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _of_one_way(cls, data: Any, handler: ValidatorFunctionWrapHandler) -> Any:
+        stop = handler(data)
+        wrong = {"rounds": "expected beside samples alone, which it divides"}
+        if stop.samples is not None:
+            why = "expected without samples, of which exactly so many are taken"
+            wrong = dict.fromkeys(PRECISELY, why)
+        lines = [
+            InitErrorDetails(type=failure(text, UNKNOWN_KEY), loc=(name,), input=data)
+            for name, text in wrong.items()
+            if name in stop.model_fields_set
+        ]
+        if lines:
+            raise ValidationError.from_exception_data(cls.__name__, lines)
+        return stop
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return what counts, with its defaults, fit for JSON and to be loaded again."""
+        return self.model_dump(
+            mode="json", include=set(PRECISELY if self.samples is None else EXACTLY)
+        )
 
 
 class Config(Model):
@@ -169,7 +207,7 @@ class Config(Model):
     """Cases to add, after exclude."""
     exclude: Annotated[tuple[Exclude, ...], OneOrMore(optional=True)] = ()
     """Cases to remove from the matrix."""
-    stop: Stop = Stop()
+    stop: Stop = Field(default_factory=Stop)
     """When to stop measuring a case."""
     render: Annotated[bool, Flag()] = False
     """Whether each case of orthographic or perspective rays is written as a picture too."""
@@ -204,4 +242,4 @@ class Config(Model):
 
     def as_dict(self) -> dict[str, Any]:
         """Return everything with its defaults, fit for JSON and to be loaded again."""
-        return self.model_dump(mode="json")
+        return self.model_dump(mode="json") | {"stop": self.stop.as_dict()}

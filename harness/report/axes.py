@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import json
+
 import altair as alt
 from freepath.report.data import DEEPEST, HIGHEST, Report
 
 APART = {"labelSeparation": 8, "labelOverlap": "greedy"}
 SCIENTIFIC = {"format": "~e", "tickCount": 6} | APART
-BELOW = alt.Legend(orient="bottom", direction="vertical", columns=1, labelLimit=320)
-"""Names of devices are long."""
+HEAD, TAIL = 18, 28
+"""Letters of a device's name that a legend has room for; its end tells drivers apart."""
+DASHES = [[1, 0], [6, 3], [2, 2], [10, 3, 2, 3], [10, 5], [6, 2, 2, 2, 2, 2]]
+"""As far apart as dashes are; of more devices some share one."""
 TIME, ERROR = "device time a ray [s]", "relative RMSE"
 CASE = [
     alt.Tooltip("method:N", title="case"),
@@ -57,6 +61,36 @@ def hover_of() -> alt.Parameter:
     )
 
 
-def dash_of() -> alt.StrokeDash:
-    """Majorants by the dashes of their lines."""
-    return alt.StrokeDash("bound:N").title("majorant")
+def dash_of(report: Report) -> alt.StrokeDash:
+    """Devices by the dashes of their lines where there are several, the same in all charts.
+
+    Else majorants, which points tell by `shape_of` where there are several devices.
+    """
+    names = devices_of(report)
+    if len(names) < 2:
+        return alt.StrokeDash("bound:N").title("majorant")
+    return alt.StrokeDash("device:N").scale(domain=names, range=DASHES).legend(below(report))
+
+
+def shape_of(report: Report) -> alt.Shape | alt.ShapeValue:
+    """Majorants by the shapes of points, where dashes are of devices."""
+    if len(devices_of(report)) < 2:
+        return alt.ShapeValue("circle")
+    return alt.Shape("bound:N").title("majorant")
+
+
+def below(report: Report) -> alt.Legend:
+    """A legend of devices; of names that are too long the middle is left out."""
+    names = devices_of(report)
+    cut = {n: f"{n[:HEAD]}...{n[-TAIL:]}" if len(n) > HEAD + TAIL + 3 else n for n in names}
+    if len(set(cut.values())) < len(cut):
+        cut = dict(zip(names, names, strict=True))
+    told = f"({json.dumps(cut)})[datum.label]"
+    return alt.Legend(
+        orient="bottom", direction="vertical", columns=1, labelLimit=320, labelExpr=told
+    )
+
+
+def devices_of(report: Report) -> list[str]:
+    """The devices of cases that were measured, in the order they come in."""
+    return list(dict.fromkeys(row["device"] for row in report.measured))

@@ -13,17 +13,19 @@ from typing import Any
 import altair as alt
 from freepath.report.axes import (
     APART,
-    BELOW,
     CASE,
     COSTS,
     ERROR,
     TIME,
+    below,
     colour_of,
     dash_of,
+    devices_of,
     error_axis,
     hover_of,
     log_x,
     log_y,
+    shape_of,
 )
 from freepath.report.data import DEEPEST, Report
 
@@ -51,7 +53,7 @@ def cost(report: Report) -> alt.LayerChart:
     lines = base.mark_line().encode(
         y=error_axis(),
         color=colour_of(report),
-        strokeDash=dash_of(),
+        strokeDash=dash_of(report),
         strokeWidth=alt.condition(hover, alt.value(4), alt.value(1.6)),
     )
     near = (
@@ -59,6 +61,7 @@ def cost(report: Report) -> alt.LayerChart:
         .encode(
             y=error_axis(),
             color=colour_of(report),
+            shape=shape_of(report),
             opacity=alt.condition("datum.grid == 0", alt.value(1), alt.value(0)),
             size=alt.condition("datum.grid == 0", alt.value(36), alt.value(150)),
             tooltip=[
@@ -105,9 +108,9 @@ def pareto(report: Report) -> alt.LayerChart:
         .transform_filter("datum.t <= datum.first")
         .encode(x=log_x("time:Q", TIME), y=error_axis())
     )
-    several = len(report.values("device")) > 1
-    dash = alt.StrokeDash("device:N").legend(BELOW if several else None)
-    lines = base.mark_line(color="#888", strokeWidth=1.5).encode(strokeDash=dash)
+    lines = base.mark_line(color="#888", strokeWidth=1.5)
+    if len(devices_of(report)) > 1:
+        lines = lines.encode(strokeDash=dash_of(report))
     points = base.mark_point(filled=True, size=60, opacity=1).encode(
         color=colour_of(report),
         shape=alt.Shape("device:N").legend(None),
@@ -131,8 +134,9 @@ def _over_tightness(report: Report, field: str, title: str) -> alt.LayerChart:
             detail=["label:N", "device:N", "bound:N"],
         )
     )
-    lines = base.mark_line().encode(strokeDash=dash_of())
-    return lines + base.mark_point(filled=True, size=36).encode(tooltip=[*CASE, *COSTS])
+    lines = base.mark_line().encode(strokeDash=dash_of(report))
+    points = base.mark_point(filled=True, size=36)
+    return lines + points.encode(shape=shape_of(report), tooltip=[*CASE, *COSTS])
 
 
 def tightness_time(report: Report) -> alt.LayerChart:
@@ -205,7 +209,7 @@ def devices(report: Report) -> alt.Chart:
         .encode(
             x=log_x("seconds:Q", f"{TIME} until the RMSE is as given"),
             y=alt.Y("method:N").title(None).axis(labelLimit=170),
-            color=alt.Color("device:N").scale(scheme="set1").legend(BELOW),
+            color=alt.Color("device:N").scale(scheme="set1").legend(below(report)),
             shape=alt.Shape("error:N").scale(domain=["10 %", "1 %", "0.1 %"]).title("RMSE"),
             tooltip=[
                 *CASE,

@@ -32,6 +32,8 @@ class Report:
     """Name and run.json of each result."""
     places: list[tuple[Path, dict[tuple[str, ...], dict[str, Any]]]] = field(default_factory=list)
     """The folder of each result, with its records by case_id, device and platform."""
+    left_out: list[str] = field(default_factory=list)
+    """Pictures that the page could not show, each with the reason."""
 
     @property
     def measured(self) -> list[dict[str, Any]]:

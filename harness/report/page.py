@@ -26,7 +26,8 @@ FIELDS = (
 
 
 def page(report: Report) -> str:
-    """The page of a report."""
+    """The page of a report; its `left_out` then names what the page could not show."""
+    renders, report.left_out = panels(report)
     shown = {
         name: {"title": CHARTS[name][1], "spec": _specification(report, name)}
         for name in useful(report)
@@ -37,13 +38,14 @@ def page(report: Report) -> str:
         "rows": [[_rounded(row.get(name)) for name in FIELDS] for row in report.rows],
         "confirmed": report.confirmed,
         "charts": shown,
-        "renders": panels(report),
+        "renders": renders,
     }
     title = f"freepath: {', '.join(run['name'] for run in report.runs)}"
     parts = {
         "@TITLE@": html.escape(title),
         "@STYLE@": _asset("page.css"),
         "@CHECKS@": "".join(_checks(run) for run in report.runs if run["checks"]),
+        "@LEFTOUT@": _left_out(report.left_out),
         "@ENVIRONMENT@": "".join(map(_environment, report.runs)),
         "@VERSION@": html.escape(__version__),
         "@DATA@": _embedded(data),
@@ -98,6 +100,15 @@ def _checks(run: dict[str, Any]) -> str:
         f"<section><h2>Is it right?</h2><p>{told}.</p>"
         f"<details><summary>Checks</summary><dl>{rows}</dl></details></section>"
     )
+
+
+def _left_out(told: list[str]) -> str:
+    """Which pictures are not shown, and why."""
+    if not told:
+        return ""
+    items = "".join(f"<li>{html.escape(one)}</li>" for one in told)
+    title = "<h2>Pictures that are left out</h2>"
+    return f'<section>{title}<ul id="left-out">{items}</ul></section>'
 
 
 def _asset(name: str) -> str:

@@ -15,7 +15,16 @@ from typing import Any
 
 import numpy as np
 from freepath.errors import FreepathError
-from freepath.pictures import EQUAL_TIME, FOLDER, exposed, read_exr, stem, write_png
+from freepath.pictures import (
+    COMPARED,
+    EQUAL_TIME,
+    FOLDER,
+    Attributes,
+    exposed,
+    read_exr,
+    stem,
+    write_png,
+)
 from freepath.report.data import Report
 from freepath.results import PLACE
 
@@ -38,6 +47,7 @@ class Render:
     """A case's picture at equal time, what else is known of it, and its case's record."""
 
     record: dict[str, Any]
+    path: Path
     mean: np.ndarray
     """[height, width, channels], and so are the next two."""
     long_mean: np.ndarray
@@ -47,36 +57,76 @@ class Render:
     time_s: float
 
 
-def panels(report: Report) -> list[dict[str, Any]]:
-    """What the page shows of the pictures of results: one item a question and device."""
+def panels(report: Report) -> tuple[list[dict[str, Any]], list[str]]:
+    """What the page shows of the pictures of results: one item a question and device.
+
+    And which files it cannot show, each with the reason.
+    """
     found: dict[tuple[str, str], list[Render]] = {}
+    left_out = []
     for result, records in report.places:
+        if not (result / EQUAL_TIME).is_dir():
+            continue
         for place, record in records.items():
-            one = _read(result, record, stem(record | dict(zip(PLACE, place, strict=True))))
-            if one:
-                found.setdefault((record["q"], record["device"]), []).append(one)
-    return [_panel(*place, renders) for place, renders in found.items()]
+            name = stem(record | dict(zip(PLACE, place, strict=True)))
+            paths = [result / folder / f"{name}.exr" for folder in (EQUAL_TIME, FOLDER)]
+            if record["status"] not in COMPARED or not any(path.is_file() for path in paths):
+                continue
+            try:
+                one = _read(record, *paths)
+                _same_size(one, found.setdefault((record["q"], record["device"]), []))
+            except UnusableError as error:
+                left_out.append(str(error))
+    return [_panel(*place, renders) for place, renders in found.items() if renders], left_out
 
 
-def _read(result: Path, record: dict[str, Any], name: str) -> Render | None:
-    """The pictures of a record; None where there are none, or none that can be read."""
-    paths = [result / folder / f"{name}.exr" for folder in (EQUAL_TIME, FOLDER)]
-    if not all(path.is_file() for path in paths):
-        return None
+class UnusableError(FreepathError):
+    """A picture that cannot be shown; the message names its file."""
+
+
+def _read(record: dict[str, Any], short: Path, long: Path) -> Render:
+    """The two pictures of a record."""
+    told, mean, _ = _parts(short)
+    _, long_mean, long_variance = _parts(long)
     try:
-        told, parts = read_exr(paths[0])
-        _, long = read_exr(paths[1])
         return Render(
             record,
-            parts["mean"],
-            long["mean"],
-            long["variance"],
+            short,
+            mean,
+            long_mean,
+            long_variance,
             told["freepath:unbiased"] == "1" and record["status"] == "ok",
             int(told["freepath:samples"]),
             float(told["freepath:time_s"]),
         )
-    except (FreepathError, KeyError, ValueError):
-        return None
+    except KeyError as error:
+        raise UnusableError(f"{short}: the attribute {error} is missing") from None
+    except ValueError as error:
+        raise UnusableError(f"{short}: an attribute is not a number: {error}") from None
+
+
+def _parts(path: Path) -> tuple[Attributes, np.ndarray, np.ndarray]:
+    """Attributes, mean and variance of a picture; raises UnusableError."""
+    if not path.is_file():
+        raise UnusableError(f"{path}: there is no such file")
+    try:
+        told, parts = read_exr(path)
+        return told, parts["mean"], parts["variance"]
+    except FreepathError as error:
+        raise UnusableError(f"{path}: {error}") from error
+    except KeyError as error:
+        raise UnusableError(f"{path}: the part {error} is missing") from None
+
+
+def _same_size(one: Render, others: list[Render]) -> None:
+    """Put a picture beside the others of its question; raises UnusableError if it does not fit."""
+    shape = others[0].mean.shape if others else one.long_mean.shape
+    for mean in (one.mean, one.long_mean):
+        if mean.shape != shape:
+            told = (" x ".join(map(str, found)) for found in (mean.shape, shape))
+            height_width_channels = "{} (height, width, channels), expected {}".format(*told)
+            raise UnusableError(f"{one.path}: its size is {height_width_channels}")
+    others.append(one)
 
 
 def reference_of(renders: Sequence[Render]) -> tuple[np.ndarray, float]:
@@ -94,8 +144,6 @@ def rmse_of(mean: np.ndarray, reference: np.ndarray, variance: float) -> float:
 
 
 def _panel(question: str, device: str, renders: list[Render]) -> dict[str, Any]:
-    shape = renders[0].mean.shape
-    renders = [one for one in renders if one.mean.shape == shape == one.long_mean.shape]
     renders = sorted(renders, key=lambda one: _late(one.record["t1"]))[:MOST]
     reference, variance = reference_of(renders)
     scale = abs(float(np.nanmean(reference))) or 1.0

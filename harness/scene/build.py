@@ -72,8 +72,9 @@ def _volume(model: Any, search_path: SearchPath) -> Medium:
         spacing = np.broadcast_to(np.asarray(model.voxel_size, dtype=np.float64), 3)
         to_world = np.diag([*spacing, 0.0])[:3]
     voxels = extinction(volume.densities, model.sigma_t, volume.path, volume.first)
+    to_medium = _inverse(to_world, volume.path)
     name = str(volume.path)
-    return GridMedium(voxels, _inverse(to_world, volume.path), model.interpolation, name)
+    return GridMedium(voxels, to_medium, model.interpolation, name, volume.first)
 
 
 def _inverse(affine: Array, path: Path) -> Array:

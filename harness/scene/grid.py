@@ -23,21 +23,27 @@ class GridMedium(Medium):
     outermost centres (clamp to edge). `voxels` is float32 [z, y, x], already scaled; it is the
     truth for references, and for kernels that read it as float. For `trilinear` an axis of one
     voxel becomes one of two half as long, so that every point lies between two centres. `name` is
-    what messages call it.
+    what messages call it, `first` the index [z, y, x] that they give its first voxel.
     """
 
     offers = frozenset({"cells"})
 
     def __init__(
-        self, voxels: NDArray[np.float32], to_medium: Array, interpolation: str, name: str = "grid"
+        self,
+        voxels: NDArray[np.float32],
+        to_medium: Array,
+        interpolation: str,
+        name: str = "grid",
+        first: tuple[int, int, int] = (0, 0, 0),
     ):
         to_medium = np.array(to_medium, dtype=np.float64)
         self._trilinear = interpolation == "trilinear"
-        self._name = name
+        self._name, self._first, self._copies = name, first, 1
         for axis in AXES:
             if self._trilinear and voxels.shape[2 - axis] == 1:
                 voxels = np.repeat(voxels, 2, axis=2 - axis)
                 to_medium[axis] *= 2.0
+                self._copies *= 2
         self.voxels = np.ascontiguousarray(voxels, dtype=np.float32)
         self.kernel = f"grid_{interpolation}"
         self._shape = self.voxels.shape[::-1]
@@ -48,8 +54,8 @@ class GridMedium(Medium):
     def stored(self, storage: str) -> Medium:
         """Return the same grid with each voxel rounded to what is stored of it: float or half.
 
-        Its `data` are float16 then. Raises VolumeError with the first voxel [z, y, x] that is too
-        large for half, and their count.
+        Its `data` are float16 then. Raises VolumeError with the first voxel that is too large for
+        half, [z, y, x] as the file counts, its value and the count of them.
         """
         if storage == "float":
             return self
@@ -57,7 +63,7 @@ class GridMedium(Medium):
             halves = self.voxels.astype(np.float16)
         self._refuse_infinite(halves)
         interpolation = "trilinear" if self._trilinear else "nearest"
-        rounded = GridMedium(halves, self.to_medium, interpolation, self._name)
+        rounded = GridMedium(halves, self.to_medium, interpolation, self._name, self._first)
         rounded.channels, rounded.data = self.channels, halves.reshape(-1)
         return rounded
 
@@ -65,13 +71,15 @@ class GridMedium(Medium):
         wrong = np.isinf(halves)
         if not wrong.any():
             return
-        first = np.argwhere(wrong)[0].tolist()
+        # of the two that stand for one voxel, the first has that voxel's index
+        found = np.argwhere(wrong)[0]
+        at = [start + int(i) for start, i in zip(self._first, found, strict=True)]
         largest = float(self.voxels.max())
         units = 2.0 ** np.ceil(np.log2(largest / LARGEST_HALF))
         raise VolumeError(
-            f"{self._name}: {int(wrong.sum())} voxels are too large for storage half, which ends "
-            f"at {LARGEST_HALF:g} (first [z, y, x] = {first}, extinction "
-            f"{self.voxels[tuple(first)]:g}, largest {largest:g}): use storage float, or a unit of "
+            f"{self._name}: {int(wrong.sum()) // self._copies} voxels are too large for storage "
+            f"half, which ends at {LARGEST_HALF:g} (first [z, y, x] = {at}: extinction "
+            f"{self.voxels[tuple(found)]:g}, largest {largest:g}): use storage float, or a unit of "
             f"length {units:g} times as long (sigma_t / {units:g}, lengths x {units:g})"
         )
 

@@ -93,7 +93,7 @@ include:
 exclude:
   tracker: [delta, {march: {step: 0.01}}]
   medium: [cloud, {layered: {values: [1, 0]}}]
-stop: {error: 0.5%, time_noise: 0.02, at_most: 500 ms, samples: 1e6}
+stop: {error: 0.5%, time_noise: 0.02, at_most: 500 ms}
 """
 
 
@@ -116,10 +116,25 @@ def test_every_kind_loads_and_loads_again_from_what_it_holds(load_text, small_ca
     assert loaded.matrix.tracker[2].as_dict() == {
         "march": {"step": 0.05, "placement": "jittered", "order": 2}
     }
-    assert loaded.stop.samples == 1_000_000
     context = {"tracker": small_catalog.parameter_models()}
     again = config.Config.model_validate(loaded.as_dict(), context=context)
     assert again.as_dict() == loaded.as_dict()
+
+
+@pytest.mark.parametrize(
+    ("stop", "held"),
+    [
+        ("{samples: 1e6}", {"samples": 1_000_000, "rounds": 10}),
+        ("{samples: 1e6, rounds: 20}", {"samples": 1_000_000, "rounds": 20}),
+        ("{at_most: 500 ms}", {"error": 0.01, "time_noise": 0.02, "at_most": 0.5}),
+        ("{at_most: 3, samples: }", {"error": 0.01, "time_noise": 0.02, "at_most": 3.0}),
+    ],
+)
+def test_what_is_held_of_either_way_to_stop_loads_again(load_text, small_catalog, stop, held):
+    loaded = load_text(GOOD + f"stop: {stop}\n")
+    assert loaded.as_dict()["stop"] == held
+    context = {"tracker": small_catalog.parameter_models()}
+    assert config.Config.model_validate(loaded.as_dict(), context=context).stop == loaded.stop
 
 
 @pytest.mark.parametrize(
@@ -314,6 +329,10 @@ BAD_TOP = [
     (GOOD + "stop: {error: 0}\n", 6, 15, "stop.error: expected a fraction > 0 and <= 1"),
     (GOOD + "stop: {at_most: 3 m}\n", 6, 17, "stop.at_most: expected a time > 0, such as 10 or 10"),
     (GOOD + "stop: {samples: 0}\n", 6, 17, "stop.samples: expected an integer >= 2, got 0"),
+    (GOOD + "stop: {rounds: 20}\n", 6, 8, "stop.rounds: expected beside samples alone, which it"),
+    (GOOD + "stop: {at_most: 1, samples: 9}\n", 6, 8, "stop.at_most: expected without samples, of"),
+    (GOOD + "stop: {samples: 9, error: 1%}\n", 6, 20, "stop.error: expected without samples, of"),
+    (GOOD + "stop: {samples: 9,\n  time_noise: 1}\n", 7, 3, "stop.time_noise: expected without s"),
     (GOOD + "stop: {at_least: 1}\n", 6, 8, "stop.at_least: unknown key; did you mean 'at_most'?"),
     (GOOD + "include: 3\n", 6, 10, "include: expected a mapping with estimand, medium"),
     (GOOD + "include: [{}]\n", 6, 11, "include[0]: expected at least one axis, got an empty mapp"),

@@ -137,6 +137,23 @@ class TestBothReaders:
         what = "1 negative (first [z, y, x] = [11, 3, 4]: -0.25)"
         assert str(error.value) == f"{path}: densities that cannot be used: {what}"
 
+    @pytest.mark.parametrize("interpolation", ["nearest", "trilinear"])
+    def test_a_voxel_too_large_for_half_is_named_as_in_the_file(self, grids, interpolation):
+        code = (
+            "import sys, pyopenvdb as vdb\n"
+            "grid = vdb.FloatGrid()\n"
+            "grid.fill((-3, 2, 10), (5, 4, 12), 1.0)\n"
+            "grid.fill((4, 3, 11), (5, 3, 11), 32768.0)\n"
+            "vdb.write(sys.argv[1], grids=[grid])"
+        )
+        path = grids / "large.vdb"
+        assert not run(code, path).returncode
+        medium = build_medium(volume_model(path, sigma_t=2.0, interpolation=interpolation))
+        with pytest.raises(VolumeError) as error:
+            medium.stored("half")
+        assert str(error.value).startswith(f"{path}: 2 voxels are too large for storage half")
+        assert "(first [z, y, x] = [11, 3, 4]: extinction 65536, " in str(error.value)
+
     def test_too_many_voxels(self, grids):
         script = Path(openvdb_reader.__file__)
         script.write_text(script.read_text().replace("2**31 - 1", "314"))
