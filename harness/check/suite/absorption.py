@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from freepath.catalog import Catalog
-from freepath.check.identities import check_clean, check_mean
+from freepath.check.identities import check_clean, check_mean, check_variance
 from freepath.check.model import Check
 from freepath.check.rig import Rig
 from freepath.check.suite.channels import check_channels
@@ -30,6 +30,10 @@ ROD = (
     "A survival that weights are not divided by, or an albedo that is left to both the chance and "
     "the weight, or to neither, is another medium: the rod model knows what this one reflects."
 )
+SPREAD = (
+    "A mean does not tell how often paths are absorbed: the second moment of a weight is what "
+    "another rod gives, whose albedo is albedo^2 / (1 - P_absorb)."
+)
 TWICE = "Between two collisions a path survives once: an integral over both knows what is lost."
 AGREE = (
     "Beyond these there is no reference: a chance that is chosen is held against roulette and "
@@ -45,6 +49,11 @@ def checks(catalog: Catalog) -> Iterator[Check]:
     for tracker, albedo, chance in [*given, *((name, 0.9, 0.3) for name in WEIGHTED)]:
         name = f"rod/albedo-{albedo}-{chance}/{tracker}"
         yield _check(name, tracker, ROD, rod, albedo=albedo, chance=chance)
+    for chance in CHOSEN:
+        yield _check(f"variance/{chance}/delta", "delta", SPREAD, variance, chance=chance)
+    # P_absorb 0, P_scatter sigma_s / (sigma_s + |sigma_n|)
+    scatter = {"sampler": {"two_knob": {"acceptance": 0.9}}, "albedo": 0.9, "chance": 0.0}
+    yield _check("rod/albedo-0.9-no-absorption/two_knob", "two_knob", ROD, rod, **scatter)
     for chance in CHOSEN:
         yield _check(f"channels/{chance}/spectral", "spectral", ROD, channels, chance=chance)
     options = {"sampler": "delta", "place": "outside", "g": 0.0, "p_absorb": 0.3}
@@ -82,18 +91,34 @@ def furnace(rig: Rig, alpha: float, tracker: str, chance: float) -> None:
         check_mean(one.moments, np.ones(16), alpha)
 
 
-def rod(rig: Rig, alpha: float, tracker: str, albedo: float, chance: float | str) -> None:
+def rod(
+    rig: Rig, alpha: float, tracker: str, albedo: float, chance: float | str, sampler: Any = None
+) -> None:
     """Transmission and reflection together; of emission, what is missing of a furnace."""
+    flown = sampler or tracker
     seen = sum(rod_model(albedo, 1.0))
     axes = {"p_absorb": chance, "rays": FEW, "tightness": 2}
     keys = {"albedo": albedo, "phase": "rod"}
-    one = follow(rig, tracker, homogeneous(1.0, **keys), **axes).run(8192)
+    one = follow(rig, flown, homogeneous(1.0, **keys), **axes).run(8192)
     check_clean(one, bounded=True)
     check_mean(one.moments, np.full(16, seen), alpha / 2)
     glowing = homogeneous(1.0, emission=1, **keys)
-    one = follow(rig, tracker, glowing, light="dark", **axes).run(8192)
+    one = follow(rig, flown, glowing, light="dark", **axes).run(8192)
     check_clean(one, bounded=True)
     check_mean(one.moments, np.full(16, 1 - seen), alpha / 2)
+
+
+def variance(rig: Rig, alpha: float, tracker: str, chance: float | str) -> None:
+    """Of paths that bring their weight where they leave."""
+    albedo, depth = 0.9, 1.0
+    survival = albedo if chance == "analog" else 1.0 - chance
+    # above 1 the root is imaginary: a rod that multiplies light, but not beyond any bound
+    second = sum(rod_model(albedo**2 / survival + 0j, depth)).real
+    axes = {"estimand": "radiance", "rays": FEW, "lanes": 16, "p_absorb": chance}
+    medium = homogeneous(depth, albedo=albedo, phase="rod")
+    scores = rig.flight(tracker=tracker, medium=medium, **axes).record(8192).score
+    expected = second - sum(rod_model(albedo, depth)) ** 2
+    check_variance(scores, np.full(16, expected), alpha)
 
 
 def channels(rig: Rig, alpha: float, tracker: str, chance: float | str) -> None:
