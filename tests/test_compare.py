@@ -136,6 +136,19 @@ def test_verdicts(changes, verdict):
     }
 
 
+@pytest.mark.parametrize(("estimate", "verdict"), [("0.5001", "SAME"), ("0.51", "DIFFERENT")])
+def test_cases_without_an_exact_value_are_compared(estimate, verdict):
+    random = np.random.default_rng(1)
+    reference, key = side(random)
+    contender, _ = side(random, estimate=estimate, seed="2")
+    for run in (*reference.runs, *contender.runs):
+        run.rows = {name: row | {"reference": ""} for name, row in run.rows.items()}
+    judged, _ = compare.compare(reference, contender, SETTINGS)
+    (one,) = [one for one in judged if one.key == key]
+    assert one.verdict == verdict
+    assert one.difference == pytest.approx((float(estimate) - 0.5) / 0.5)
+
+
 @pytest.mark.parametrize(("factor", "verdict"), [(1.2, "SLOWER"), (0.8, "FASTER")])
 def test_times(factor, verdict):
     random = np.random.default_rng(1)
