@@ -13,6 +13,7 @@ from freepath import effects, limits, majorants, source
 from freepath.catalog import ANY, Catalog, Tracker
 from freepath.device import Device, DeviceInfo, Program, scalar_type
 from freepath.majorants import Majorant
+from freepath.path_axes import weights_grow
 from freepath.plan import Case
 from freepath.runner import KernelData, Runner
 from freepath.scene import Medium, Sky, make_rays, path_reference, read_sky, reference, segments
@@ -121,10 +122,12 @@ class Scene:
     def largest_score(self, case: Case) -> float:
         """What no score exceeds while weights stay below 1, or below the number of channels.
 
-        inf where a point light may be as near as one likes.
+        inf where a point light may be as near as one likes, or where weights grow at scatterings.
         """
         if case.estimand == "mean_extinction":
             return float(self.bounds((1, 1, 1))[1].max())
+        if weights_grow(case):
+            return math.inf
         if case.estimand == "radiance":
             return self._brightest(case) * len(self.medium.channels)
         longest = 1.0 if case.estimand == "transmittance" else float(self.segments[:, 6].max())

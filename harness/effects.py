@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 from freepath import kernel_files
-from freepath.config.sweep import UNLIMITED
+from freepath.config.sweep import AUTO, UNLIMITED
 from freepath.kernel_files import KernelFile
+from freepath.path_axes import chance_of_absorption
 
 MOST_SCATTERINGS = (1 << 24) - 1
 """What `unlimited` is in a kernel, which counts in float; far above any path's steps."""
@@ -100,8 +101,7 @@ class Effects:
         if "scattering" in self:
             before += ["effects/near_light"] if self.near_light else []
             before += ["effects/angle_table"] if self.aims and self.phase != "isotropic" else []
-            limited = "roulette" if "roulette" in self else "no_roulette"
-            before.append(f"effects/{limited}")
+            before.append(f"effects/{self._ended_by}")
         names = "effects/mode_names" if self.modes else "effects/flight_names"
         files = [kernel_files.read(name) for name in [*before, names]]
         files.append(tracker)
@@ -130,6 +130,11 @@ class Effects:
         elif "point_light" in self:
             after.append("effects/shadow_loop")
         return after
+
+    @property
+    def _ended_by(self) -> str:
+        """By which chance a path ends at a collision."""
+        return next((name for name in ("p_absorb", "roulette") if name in self), "no_roulette")
 
     @property
     def _until(self) -> str:
@@ -233,7 +238,8 @@ def _names(case: Any, shadow: Shadow | None, *, everything: bool) -> tuple[str, 
         "environment_image": collects and hasattr(light, "file"),
         "point_light": collects and scatters and lit and shadow is not None,
         "scattering": scatters,
-        "roulette": scatters and case.scatterings == UNLIMITED,
+        "p_absorb": scatters and case.p_absorb != AUTO,
+        "roulette": scatters and case.p_absorb == AUTO and case.scatterings == UNLIMITED,
     }
     return tuple(name for name, there in has.items() if there)
 
@@ -257,6 +263,8 @@ def _values(
         unlimited = case.scatterings == UNLIMITED
         optics["scatterings"] = MOST_SCATTERINGS if unlimited else case.scatterings
         optics["g"] = model.g
+    if "p_absorb" in names:
+        optics["p_absorb"] = chance_of_absorption(case)
     if "scattering" in names or "environment_image" in names:
         values["space"] = _space(medium)
     if "point_light" in names:

@@ -26,6 +26,7 @@ EFFECTS = {
     "environment_image": "light from outside as an image has it: looked up where a path leaves",
     "scattering": "a path goes on in a new direction; phase: isotropic, Henyey-Greenstein or rod",
     "roulette": "scatterings without limit: a path of little weight may end",
+    "p_absorb": "a path is absorbed at a collision with a chosen chance, and weighted for it",
     "point_light": "a shadow ray at each scattering, with a tracker of its own",
     "length": "the length of paths instead of what they collect",
     "chromatic": "a weight for each channel: one lookup and one path serve all",

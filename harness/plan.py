@@ -15,8 +15,9 @@ from typing import Any
 from freepath.applicable import skip_reason
 from freepath.catalog import Catalog
 from freepath.config.base import Kind
-from freepath.config.sweep import ALONG_PATHS, AXES, Config, Exclude, Include, Stop
+from freepath.config.sweep import AUTO, AXES, Config, Exclude, Include, Stop
 from freepath.errors import ConfigError, NothingMatchedError, Problem
+from freepath.path_axes import refuse_elsewhere, settle
 
 MOST_CASES = 100_000
 ID_LENGTH = 12
@@ -51,9 +52,10 @@ class Case:
     skip_reason: str
     light: Kind | None = None
     scatterings: int | str | None = None
+    p_absorb: float | str | None = None
     shadow: Kind | None = None
     effects: str | None = None
-    """These four are of paths that scatter, None for other estimands; `shadow` is None without a
+    """These five are of paths that scatter, None for other estimands; `shadow` is None without a
     point light."""
 
     def identity(self) -> dict[str, Any]:
@@ -77,7 +79,10 @@ class Case:
         }
 
     def _of_paths(self) -> dict[str, Any]:
+        # as with storage
+        absorbed = {} if self.p_absorb == AUTO else {"p_absorb": self.p_absorb}
         return {
+            **absorbed,
             "light": self.light.as_dict(),
             "scatterings": self.scatterings,
             "shadow": self.shadow.as_dict() if self.shadow else None,
@@ -110,13 +115,15 @@ def expand(config: Config, catalog: Catalog) -> list[Case]:
 
     First the matrix, less what exclude entries match, then what include entries add. The config's
     trackers must be the catalog's. Raises ConfigError for an exclude entry that matches nothing
-    (unless axes are overridden) and for too many cases, NothingMatchedError if none is left.
+    (unless axes are overridden), for too many cases and for p_absorb
+    where no path is followed, NothingMatchedError if none is left.
     """
     matrix = {axis: getattr(config.matrix, axis) for axis in AXES}
     if not matrix["shadow"]:
         default = catalog.trackers.get(SHADOW)
         matrix["shadow"] = (default.model() if default else None,)
     _refuse_too_many(config, matrix)
+    refuse_elsewhere(config)
     points = _excluded(config, _points(matrix, catalog))
     for entry in config.include:
         points |= _points({**matrix, **_included_axes(entry, config)}, catalog)
@@ -149,10 +156,7 @@ def _points(axes: dict[str, tuple[Any, ...]], catalog: Catalog) -> dict[tuple[An
     points = {}
     for values in itertools.product(*(axes[axis] for axis in AXES)):
         point = dict(zip(AXES, values, strict=True))
-        if point["estimand"] not in ALONG_PATHS:
-            point |= dict.fromkeys(("light", "scatterings", "shadow", "effects"))
-        elif "position" not in type(point["light"]).model_fields and point["effects"] == "auto":
-            point["shadow"] = None
+        settle(point)
         trackers = [kind for kind in (point["tracker"], point["shadow"]) if kind]
         if not any("majorant" in catalog.trackers[kind.kind].needs for kind in trackers):
             point["majorant"] = point["tightness"] = None
@@ -211,6 +215,8 @@ def _name(point: Point) -> str:
         parts += [label(point["majorant"]), f"t{_short(point['tightness'])}"]
     if point["light"]:
         parts += [label(point["light"]), f"s{point['scatterings']}"]
+        absorbed = point["p_absorb"]
+        parts += [] if absorbed == AUTO else [f"p_absorb={_short(absorbed)}"]
         parts += [label(point["shadow"])] if point["shadow"] else []
         parts += ["effects=all"] if point["effects"] == "all" else []
     parts += [] if point["storage"] == "float" else [f"storage={point['storage']}"]

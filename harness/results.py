@@ -12,7 +12,7 @@ from typing import Any
 
 from freepath.errors import FreepathError
 
-SCHEMA_VERSION = 3
+SCHEMA_VERSION = 4
 SUMMARY, SAMPLES, CONFIRM, RUN = "summary.csv", "samples.csv", "confirm.csv", "run.json"
 CHECKS = "checks.json"
 """What became of the checks of a tracker on trial."""
@@ -22,7 +22,7 @@ COLUMNS = (
     "schema_version", "run_id", "case_id", "case", "status", "reason",
     "device", "platform", "driver_version",
     "tracker", "estimand", "medium", "channels", "majorant", "tightness", "effects",
-    "light", "scatterings", "shadow", "composition",
+    "light", "scatterings", "p_absorb", "shadow", "composition",
     "arithmetic", "storage", "lanes", "params", "seed",
     "rays", "samples_per_ray", "rounds", "stopped",
     "lookups_per_sample", "crossings_per_sample", "steps_per_sample", "lane_occupancy",
@@ -48,8 +48,8 @@ CONFIRM_COLUMNS = (
 )
 TEXTS = frozenset((
     "run_id", "case_id", "case", "status", "reason", "device", "platform", "driver_version",
-    "tracker", "estimand", "medium", "majorant", "effects", "light", "scatterings", "shadow",
-    "composition", "arithmetic", "storage", "params", "stopped",
+    "tracker", "estimand", "medium", "majorant", "effects", "light", "scatterings", "p_absorb",
+    "shadow", "composition", "arithmetic", "storage", "params", "stopped",
     "timing_source", "source_sha256", "config_sha256",
 ))
 # fmt: on

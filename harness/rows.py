@@ -42,6 +42,7 @@ def base_row(case: Case, device: DeviceInfo, run_id: str) -> dict[str, Any]:
         "tightness": case.tightness,
         "light": label(case.light) if case.light else "none",
         "scatterings": "none" if case.light is None else str(case.scatterings),
+        "p_absorb": "none" if case.light is None else str(case.p_absorb),
         "shadow": label(case.shadow) if case.shadow else "none",
         "composition": case.effects or "auto",
         "arithmetic": case.arithmetic,

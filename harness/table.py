@@ -129,8 +129,10 @@ def _method(row: Row) -> str:
 
 
 def along(row: Row) -> list[str]:
-    """How shadow rays are followed and what is compiled, where a case says so."""
-    parts = [] if row["shadow"] in ("", "none") else [f"shadow {row['shadow']}"]
+    """How paths are absorbed, shadow rays followed, and what is compiled, where a case says so."""
+    usual = row["p_absorb"] in ("", "none", "auto")
+    parts = [] if usual else [f"p_absorb {row['p_absorb']}"]
+    parts += [] if row["shadow"] in ("", "none") else [f"shadow {row['shadow']}"]
     return parts + (["all effects"] if row["composition"] == "all" else [])
 
 

@@ -22,10 +22,13 @@ POINT = {"point": {"position": [0, 0, 2]}}
         ({"estimand": "radiance", "light": {"uniform": {"radiance": 2}}}, 4.0),
         ({"estimand": "radiance", "light": "dark"}, 2.0),
         ({"estimand": "radiance", "light": POINT}, math.inf),
+        ({"estimand": "radiance", "p_absorb": 0.4}, 3.0),
+        ({"estimand": "radiance", "p_absorb": 0.6}, math.inf),
+        ({"estimand": "path_length", "p_absorb": 0.6}, math.inf),
     ],
 )
 def test_largest_score(rig, axes, largest):
-    medium = {"homogeneous": {"sigma_t": 2, "emission": 2}}
+    medium = {"homogeneous": {"sigma_t": 2, "emission": 2, "albedo": 0.5}}
     case = rig.case(rays=SINGLE, medium=medium, tracker="delta", **axes)
     scene = Scene.of(case, build_medium(case.medium), [])
     assert scene.largest_score(case) == pytest.approx(largest)

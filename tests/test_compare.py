@@ -21,7 +21,7 @@ SETTINGS = compare.Settings()
 
 def row_of(name, **changes):
     row = dict.fromkeys(COLUMNS, "") | {
-        "schema_version": "3",
+        "schema_version": "4",
         "run_id": "r",
         "case_id": name,
         "case": f"transmittance/m/{name}/auto/strict",
@@ -136,6 +136,19 @@ def test_verdicts(changes, verdict):
     }
 
 
+@pytest.mark.parametrize(("estimate", "verdict"), [("0.5001", "SAME"), ("0.51", "DIFFERENT")])
+def test_cases_without_an_exact_value_are_compared(estimate, verdict):
+    random = np.random.default_rng(1)
+    reference, key = side(random)
+    contender, _ = side(random, estimate=estimate, seed="2")
+    for run in (*reference.runs, *contender.runs):
+        run.rows = {name: row | {"reference": ""} for name, row in run.rows.items()}
+    judged, _ = compare.compare(reference, contender, SETTINGS)
+    (one,) = [one for one in judged if one.key == key]
+    assert one.verdict == verdict
+    assert one.difference == pytest.approx((float(estimate) - 0.5) / 0.5)
+
+
 @pytest.mark.parametrize(("factor", "verdict"), [(1.2, "SLOWER"), (0.8, "FASTER")])
 def test_times(factor, verdict):
     random = np.random.default_rng(1)
@@ -218,7 +231,7 @@ def test_what_should_not_be_compared_is_refused(tmp_path, runs, capsys):
     assert "expected the folder of a run" in capsys.readouterr().err
     (b / "summary.csv").write_text("a,b\n")
     assert main(["compare", str(a), str(b)]) == 2
-    assert "schema version 3" in capsys.readouterr().err
+    assert "schema version 4" in capsys.readouterr().err
     assert main(["compare", str(a), str(a), "-o", "x.pdf"]) == 2
 
 

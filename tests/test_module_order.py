@@ -14,6 +14,7 @@ ORDER = (
     ("config",),
     ("kernel_files",),
     ("catalog",),
+    ("path_axes",),
     ("applicable", "effects", "listing"),
     ("plan",),
     ("scene", "source", "octree", "stats"),

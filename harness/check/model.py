@@ -33,6 +33,7 @@ GROUPS = {
     "accumulation": "a thousand million samples",
     "long-runs": "numbers beyond 32 bits, launches that are cut",
     "scattering": "furnaces, emission, phase functions, lights beside a ray and far away",
+    "p_absorb": "paths absorbed with a chance of one's choice: none, some, as the albedo says",
     "channels": "several channels on one path: a thousand to one, nothing, their albedos",
     "bad-input": "volumes that must be refused",
 }

@@ -6,6 +6,7 @@ from freepath.check.planted import HARD, Defect
 
 SCATTERING = f"{HARD}/scattering"
 CHANNELS = f"{HARD}/channels"
+ABSORBED = f"{HARD}/p_absorb"
 SINGLE = f"{SCATTERING}/single/ratio-g-0.0/delta"
 VOXELS = f"{SCATTERING}/voxels/ratio-g-0.6/delta"
 
@@ -99,6 +100,30 @@ PATHS = (
         "path->weight / largest",
         "path->weight",
         f"{SCATTERING}/rod/albedo-0.3-tau-2.0/delta",
+    ),
+    Defect(
+        "a survival that a weight is not divided by",
+        "path->weight / survival",
+        "path->weight",
+        f"{ABSORBED}/rod/albedo-0.9-0.3/delta",
+    ),
+    Defect(
+        "paths that are absorbed when they should survive",
+        "on & less(uniform(rng), (real)scene->optics.p_absorb)",
+        "on & ~less(uniform(rng), (real)scene->optics.p_absorb)",
+        f"{ABSORBED}/rod/albedo-0.3-analog/delta",
+    ),
+    Defect(
+        "an albedo that is left out where a path is absorbed by chance",
+        "tint(path, c, (real)scene->optics.albedo[c], on);",
+        "",
+        f"{ABSORBED}/rod/albedo-0.3-analog/delta",
+    ),
+    Defect(
+        "weights of channels that are divided by another chance than they survive by",
+        "(SCALAR)1 - scene->optics.p_absorb;",
+        "scene->optics.albedo[0];",
+        f"{ABSORBED}/channels/0.3/spectral",
     ),
     Defect(
         "a combined sample that is not weighted",

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from freepath.catalog import Catalog
 from freepath.check.model import Check
 from freepath.check.suite import (
+    absorption,
     channels,
     counted,
     empty_full,
@@ -38,6 +39,7 @@ SUITE = (
     long_runs,
     scattering,
     near_light,
+    absorption,
     channels,
     counted,
     stored,

@@ -133,9 +133,13 @@ def _measured(key: Key, before: Row, after: Row, change: Change | None) -> Judge
 
 
 def _difference(before: Row, after: Row) -> tuple[float, float | None]:
-    """Contender's estimate less the reference's, relative, and in standard errors."""
+    """Contender's estimate less the reference's: relative to the exact value, in standard errors.
+
+    Where the exact value is unknown, as of most radiance, relative to the reference's estimate.
+    """
     first, second = number(before, "estimate"), number(after, "estimate")
-    scale = abs(number(before, "reference")) or 1.0
+    known = number(before, "reference")
+    scale = abs(first if known is None else known) or 1.0
     stderr = math.hypot(number(before, "bias_stderr"), number(after, "bias_stderr"))
     difference = second - first
     return difference / scale, difference / stderr if stderr > 0 else None

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from freepath.config.rules import Rule, expected
+from freepath.errors import did_you_mean
+from pydantic_core import PydanticCustomError
 
 _NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 _NAME = r"[A-Za-zµμ]+(?:(?:\^|\*\*)-?[0-9])?"
@@ -172,3 +174,29 @@ class CountOr(Rule):
     def json_schema(self) -> dict[str, Any]:
         """Return the schema of either."""
         return {"anyOf": [Number("count", minimum=0).json_schema(), {"const": self.word}]}
+
+
+@dataclass(frozen=True)
+class NumberOr(Rule):
+    """A number of a rule, or one of some words that stand for no such number."""
+
+    number: Number
+    words: tuple[str, ...]
+
+    def check(self, value: Any, context: Any) -> float | int | str:
+        """Return the number in base units, or the word."""
+        if isinstance(value, str) and value in self.words:
+            return value
+        try:
+            return self.number.check(value, context)
+        except PydanticCustomError:
+            hint = did_you_mean(value, self.words) if isinstance(value, str) else ""
+            raise expected(self.describe(), value, hint) from None
+
+    def describe(self) -> str:
+        """Return what it may be."""
+        return " or ".join([", ".join(self.words), self.number.describe()])
+
+    def json_schema(self) -> dict[str, Any]:
+        """Return the schema of either."""
+        return {"anyOf": [self.number.json_schema(), {"enum": list(self.words)}]}

@@ -7,7 +7,7 @@ from freepath.config.base import UNKNOWN_KEY, Kind, Model, OneOf
 from freepath.config.document import Document, Location, path_text
 from freepath.config.lights import LIGHTS, Uniform
 from freepath.config.models import MAJORANTS, MEDIA, Fraction, Global, Seed
-from freepath.config.quantity import CountOr, Number
+from freepath.config.quantity import CountOr, Number, NumberOr
 from freepath.config.rays import RAYS, Orthographic
 from freepath.config.rules import Choice, Flag, OneOrMore, Text, expected, failure
 from freepath.errors import Problem
@@ -27,6 +27,8 @@ ESTIMANDS = ("transmittance", "free_path", "radiance", "path_length", "mean_exti
 ALONG_PATHS = ("radiance", "path_length")
 """Estimands of paths that scatter; the axes light to effects are only theirs."""
 UNLIMITED = "unlimited"
+AUTO, ANALOG = "auto", "analog"
+"""Of p_absorb: none of bounded paths and roulette of others; what the albedo leaves."""
 LANES = ("auto", 1, 2, 4, 8, 16)
 ARITHMETIC = ("strict", "fast", "double")
 STORAGE = ("float", "half")
@@ -43,6 +45,8 @@ Trackers = Annotated[tuple[Annotated[Kind, OneOf(TRACKER)], ...], OneOrMore()]
 Lights = Annotated[tuple[Annotated[Kind, OneOf("light", LIGHTS)], ...], OneOrMore()]
 Shadows = Annotated[tuple[Annotated[Kind, OneOf(TRACKER)], ...], OneOrMore(optional=True)]
 Scatterings = Annotated[tuple[Annotated[int | str, CountOr(UNLIMITED)], ...], OneOrMore()]
+Chance = NumberOr(Number("fraction", minimum=0, below=1), (AUTO, ANALOG))
+Absorptions = Annotated[tuple[Annotated[float | str, Chance], ...], OneOrMore()]
 Effects = Annotated[tuple[Annotated[str, Choice(("auto", "all"))], ...], OneOrMore()]
 Lanes = Annotated[tuple[Annotated[int | str, Choice(LANES)], ...], OneOrMore()]
 Arithmetics = Annotated[tuple[Annotated[str, Choice(ARITHMETIC)], ...], OneOrMore()]
@@ -71,6 +75,9 @@ class Matrix(Model):
     """What shines on the medium, of radiance."""
     scatterings: Scatterings = (UNLIMITED,)
     """How often a path may scatter, of radiance; unlimited ends it by Russian roulette."""
+    p_absorb: Absorptions = (AUTO,)
+    """The chance that a path is absorbed at a collision, of radiance: analog is
+    1 - albedo; auto is 0 for bounded scatterings, and else Russian roulette by weight."""
     shadow: Shadows = ()
     """The tracker that estimates the transmittance towards a point light; ratio if left out."""
     effects: Effects = ("auto",)
@@ -114,6 +121,7 @@ class Include(Entry):
     tracker: Trackers = Field(None)
     light: Lights = Field(None)
     scatterings: Scatterings = Field(None)
+    p_absorb: Absorptions = Field(None)
     shadow: Trackers = Field(None)
     effects: Effects = Field(None)
     lanes: Lanes = Field(None)
@@ -134,6 +142,7 @@ class Exclude(Entry):
     tracker: Annotated[tuple[TrackerPattern, ...], OneOrMore()] = Field(None)
     light: Annotated[tuple[LightPattern, ...], OneOrMore()] = Field(None)
     scatterings: Scatterings = Field(None)
+    p_absorb: Absorptions = Field(None)
     shadow: Annotated[tuple[TrackerPattern, ...], OneOrMore()] = Field(None)
     effects: Effects = Field(None)
     lanes: Lanes = Field(None)

@@ -50,11 +50,13 @@ def _check(
     return Check(f"hard/scattering/{name}", labels, sentence, run, kernels=kernels)
 
 
-def double(rig: Rig, alpha: float, tracker: str, sampler: Any, place: str, g: float) -> None:
+def double(
+    rig: Rig, alpha: float, tracker: str, sampler: Any, place: str, g: float, **axes: Any
+) -> None:
     """Light that scatters once and twice, against both integrals."""
     position = np.array(PLACES[place])
     intensity = 10 * max(1.0, abs(position[2])) ** 2
-    twice = _fly(rig, sampler, position, intensity, g, 2)
+    twice = _fly(rig, sampler, position, intensity, g, 2, **axes)
     expected = _fly(rig, sampler, position, intensity, g, 1).reference()
     again, error = double_scattering(SIGMA_T, g, position, twice.segments, seed=rig.seed)
     factor = ALBEDO**2 * intensity
@@ -67,7 +69,7 @@ def double(rig: Rig, alpha: float, tracker: str, sampler: Any, place: str, g: fl
 
 
 def _fly(
-    rig: Rig, sampler: Any, position: Any, intensity: float, g: float, scatterings: int
+    rig: Rig, sampler: Any, position: Any, intensity: float, g: float, scatterings: int, **axes: Any
 ) -> Flight:
     return follow(
         rig,
@@ -77,4 +79,5 @@ def _fly(
         scatterings=scatterings,
         shadow="analytic",
         rays=FEW,
+        **axes,
     )
