@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 from freepath.measure import UNITS_PER_LANE, Bench, shape_of
-from freepath.runner import SAMPLES_PER_UNIT, Runner
+from freepath.runner import SAMPLES_PER_UNIT, Round, Runner
 from freepath.stats import relative_half_width
 
 BUDGET_S = 0.32
@@ -107,19 +107,22 @@ def confirmed_rows(row: dict[str, Any], bench: Bench, reference: np.ndarray) -> 
     per_ray = int(BUDGET_S / TURNS / (runner.rays * seconds))
     shape = shape_of(per_ray, runner.rays, seconds, runner.lanes_in_all)
     for turn in range(1, MOST * TURNS + 1):
-        beside.append(runner.run(first, shape.samples, shape.blocks).time_per_sample_s)
+        rounds = [runner.run(first, shape.samples, shape.blocks)]
+        beside.append(rounds[0].time_per_sample_s)
         for one in counts:
-            _take(one, runner, first, reference)
+            rounds.append(_taken(one, runner, first, reference))
             first += one.samples * one.blocks
+        bench.measurement.time_device_s += sum(one.time_s for one in rounds)
         if turn % TURNS == 0 and steady(beside) and all(one.settled for one in counts):
             break
     return [row | _measured(row, one, quiet(beside)) for one in counts]
 
 
-def _take(repeats: Repeats, runner: Runner, first: int, reference: np.ndarray) -> None:
+def _taken(repeats: Repeats, runner: Runner, first: int, reference: np.ndarray) -> Round:
     one = runner.run(first, repeats.samples, repeats.blocks)
     repeats.squares.append(((one.means - reference) ** 2).reshape(len(one.means), -1).mean(1))
     repeats.times.append(one.time_per_sample_s)
+    return one
 
 
 def _measured(row: dict[str, Any], repeats: Repeats, beside: float) -> dict[str, Any]:

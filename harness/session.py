@@ -167,6 +167,7 @@ class Run:
                 sweep.run(scene.for_device(sweep.device.info), group, self.config.seed)
         finally:
             self.clock.build_s += sweep.time_build_s
+            self.clock.device_s += sweep.time_confirming_s
 
     def _done(self, row: dict[str, Any]) -> None:
         self.ended += 1

@@ -54,6 +54,8 @@ class Sweep:
     render: bool = False
     """Whether cases whose rays have a picture get one."""
     time_build_s: float = 0.0
+    time_confirming_s: float = 0.0
+    """Device time that is in no row."""
     _shots: list[equal_time.Shot] = field(default_factory=list)
     """Cases of the scene at work that were measured, where they get pictures."""
     _programs: dict[str, Program | BuildError] = field(default_factory=dict)
@@ -202,6 +204,7 @@ class Sweep:
                 confirmed = confirmed_rows(row, job.bench, values)
             except RunError as error:
                 return self._fail(job, error)
+            self.time_confirming_s += found.time_device_s - row["time_device_s"]
         return self._finish(job, row, round_rows(row, found), confirmed)
 
     def _unbiased(self, job: Job) -> bool:

@@ -1,5 +1,6 @@
 """That predicted errors are measured, and that a wrong prediction would be seen."""
 
+import json
 import math
 from types import SimpleNamespace
 
@@ -34,7 +35,9 @@ class NormalRunner:
         self.taken.append((first, samples * blocks))
         noise = self.random.normal(size=(blocks, RAYS)) * 0.2 / math.sqrt(samples)
         return SimpleNamespace(
-            means=0.5 + self.bias + noise, time_per_sample_s=self.slower * SECONDS
+            means=0.5 + self.bias + noise,
+            time_per_sample_s=self.slower * SECONDS,
+            time_s=self.slower * SECONDS * RAYS * samples * blocks,
         )
 
 
@@ -66,7 +69,9 @@ def rows_of(runner, **row):
         "time_to_1pct_s": 1.0,
     } | row
     moments = Moments(1000, np.zeros(RAYS), np.zeros(RAYS))
-    bench = SimpleNamespace(timed=runner, measurement=SimpleNamespace(moments=moments))
+    bench = SimpleNamespace(
+        timed=runner, measurement=SimpleNamespace(moments=moments, time_device_s=0.0)
+    )
     return confirm.confirmed_rows(row, bench, np.full(RAYS, 0.5))
 
 
@@ -162,6 +167,10 @@ def test_run_confirm(work, selector, capsys):
         assert 0.5 < float(row["rmse_predicted"]) / measured < 2
         if row["tracker"] == "march":
             assert table.off(row) < 1e-3
+    # what confirming takes is in no row, but no time outside the device
+    spent = sum(float(row["time_device_s"]) for row in read_rows(work / "out" / "summary.csv"))
+    told = json.loads((work / "out" / "run.json").read_text())["sessions"][-1]["time_device_s"]
+    assert told > spent + 3 * confirm.BUDGET_S
     before = (work / "out" / "confirm.csv").read_bytes()
     assert cli.main([*arguments, "--resume"]) == 0
     assert (work / "out" / "confirm.csv").read_bytes() == before
