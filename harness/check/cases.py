@@ -15,12 +15,12 @@ from freepath.check.identities import (
     check_mean,
     check_weighted_free_path,
     roundings,
+    violations_by_rounding,
 )
 from freepath.check.rig import Flight, Rig
 from freepath.check.samples import Samples
 from freepath.check.truth import depth_at
 from freepath.check.verdict import demand
-from freepath.stats import Moments
 
 Axes = dict[str, Any]
 
@@ -39,16 +39,12 @@ def check_case(rig: Rig, axes: Axes, alpha: float, samples: int = 2048, **option
 def check_samples(flight: Flight, samples: Samples, alpha: float) -> None:
     """All that must hold for samples of any tracker."""
     tracker, case = flight.tracker, flight.case
-    check_clean(samples.round, bounded=case.majorant is not None and case.tightness >= 1)
+    bounded = case.majorant is not None and case.tightness >= 1
+    check_clean(samples.round, bounded=bounded, violations=_by_rounding(flight, samples, alpha))
     expected, moments = flight.reference(), samples.round.moments
     depth = flight.depth
     if case.estimand == "transmittance":
-        still = moments.m2 == 0.0  # next-flight and the like vary in empty space too
-        check_empty(
-            Moments(moments.count, moments.mean[still], moments.m2[still]),
-            depth[still],
-            flight.rounding,
-        )
+        check_empty(moments, depth, flight.rounding)
     if not tracker.unbiased:
         bias = float(np.sqrt(np.mean((moments.mean - expected) ** 2)))
         demand(bias < COARSE, f"bias {bias:.3g}, expected below {COARSE}")
@@ -81,6 +77,15 @@ def _largest_depth(flight: Flight) -> np.ndarray:
 def ends_where_it_scores(samples: Samples) -> bool:
     """Whether the end of a flight is a free path, and its weight that of it."""
     return np.allclose(samples.score, samples.weight * samples.t, rtol=1e-6, atol=1e-30)
+
+
+def _by_rounding(flight: Flight, samples: Samples, alpha: float) -> int:
+    """How many violations of the majorants of cells are no fault in constant voxels."""
+    medium, majorant = flight.medium, flight.case.majorant
+    if majorant is None or majorant.kind == "global" or medium.kernel != "grid_nearest":
+        return 0
+    lookups = samples.round.counters["lookups"]
+    return violations_by_rounding(lookups, int(max(medium.extent)), flight.rounding, alpha)
 
 
 def check_distribution(

@@ -97,9 +97,15 @@ KERNELS = (
     ),
     Defect(
         "a next flight from the start of the ray each time",
-        "throughput * exp(path->depth - path->state.total)",
+        "throughput * exp(-ahead)",
         "throughput * exp(-path->state.total)",
         f"{ID}/next_flight_ratio/transmittance/trilinear/grid",
+    ),
+    Defect(
+        "a depth ahead with the roundings of all that was flown",
+        "return choose(walked, depth, ahead);",
+        "return ahead;",
+        f"{HARD}/loose/1e6/next_flight_delta",
     ),
     Defect(
         "a term of the series that is lost in part",

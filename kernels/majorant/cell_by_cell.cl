@@ -66,3 +66,28 @@ static real majorant_depth(Path *path, const Scene *scene)
     path->crossings = probe.crossings;
     return depth;
 }
+
+/* That from here on. What was flown adds up with a rounding a collision, of a part in 2^24 of the whole; where
+   that tells, the last of the ray is walked ahead instead, until nothing more comes through. */
+#define MANY_ROUNDINGS 1024
+#define BLACK 128
+static real majorant_depth_ahead(Path *path, const Scene *scene, const real whole, const mask where)
+{
+    const real ahead = whole - path->depth;
+    const mask walked = where & less((real)MANY_ROUNDINGS, whole) & less(ahead, (real)MANY_ROUNDINGS);
+    if (!any_lane(walked))
+        return ahead;
+    Path probe = *path;
+    mask walking = walked;
+    real depth = (real)0;
+    while (any_lane(walking)) {
+        const real plane = next_plane(&probe, scene);
+        const real t_exit = smaller(plane, probe.length);
+        depth = choose(walking, depth + probe.majorant * (t_exit - probe.t), depth);
+        probe.t = choose(walking, t_exit, probe.t);
+        walking &= less(plane, probe.length) & less(depth, (real)BLACK);
+        enter_next_cell(&probe, scene, plane, walking);
+    }
+    path->crossings = probe.crossings;
+    return choose(walked, depth, ahead);
+}

@@ -30,3 +30,9 @@ static void place_at_depth(Path *path, const Scene *scene, const real depth)
 
 /* The majorant's optical depth of the whole ray. */
 static real majorant_depth(Path *path, const Scene *scene) { return path->majorant * path->length; }
+
+/* That from here on, which is what the next draw is held against. */
+static real majorant_depth_ahead(const Path *path, const Scene *scene, const real whole, const mask where)
+{
+    return path->majorant * (path->length - path->t);
+}

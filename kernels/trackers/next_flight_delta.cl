@@ -25,5 +25,7 @@ static void step(Path *path, const Scene *scene, Rng *rng)
     const mask here = next_tentative(path, scene, rng);
     const real sigma = sigma_t_at_tentative(path, scene, here);
     collide(path, here & less(uniform(rng) * path->majorant, sigma));
-    deposit(path, exp(path->depth - path->state.total), path->length, (mask)-1, here & path->live);
+    const mask null = here & path->live;
+    const real ahead = majorant_depth_ahead(path, scene, path->state.total, null);
+    deposit(path, exp(-ahead), path->length, (mask)-1, null);
 }

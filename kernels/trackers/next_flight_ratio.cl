@@ -28,5 +28,6 @@ static void step(Path *path, const Scene *scene, Rng *rng)
     const real null = sigma_n / path->majorant;
     const real throughput = path->state.throughput * null;
     path->state.throughput = choose(here, throughput, path->state.throughput);
-    deposit(path, throughput * exp(path->depth - path->state.total), path->length, (mask)-1, here);
+    const real ahead = majorant_depth_ahead(path, scene, path->state.total, here);
+    deposit(path, throughput * exp(-ahead), path->length, (mask)-1, here);
 }

@@ -31,6 +31,9 @@ CLAMPED = ("delta", "decomposition", "next_flight_delta")
 ANALOG = ("delta", "ratio", "split", "two_knob", "weighted_delta")
 """Trackers whose null collisions have no weight left where the majorant is met."""
 
+MOST = 16
+"""Of exp(-x), summed over points x of a Poisson process of rate 1: more comes once in 1e20."""
+
 
 def checks(catalog: Catalog) -> Iterator[Check]:
     """The groups non-bounding, loose and residual."""
@@ -173,6 +176,9 @@ def very_loose(rig: Rig, alpha: float, tracker: Tracker) -> None:
     demand(found["steps"] >= cut * STEP_CAP, f"{cut} paths were cut off before the cap")
     if cut:
         return
+    # a sum of the chances to get out from each collision: of those that tell there are few
+    most = samples.score.max()
+    demand(most <= MOST, f"a score of {most:.3g}, expected at most {MOST}")
     spread = samples.score.std() / np.sqrt(samples.score.size) + 1e-12
     error = abs(samples.score.mean() - expected.mean())
     # a score that is 0 or 1 may be the same 32 times

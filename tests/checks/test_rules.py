@@ -1,0 +1,45 @@
+"""Rules of checks that are no tests of a distribution: what they let pass, and what they do not."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from freepath.check.identities import check_clean, check_empty, violations_by_rounding
+from freepath.check.verdict import Failure
+from freepath.stats import Moments
+
+ROUNDING = 2.0**-24
+COUNT = 2048
+
+
+def through_nothing(mean, m2):
+    return Moments(COUNT, np.array(mean), np.array(m2)), np.zeros(len(mean))
+
+
+def test_a_ray_whose_rare_score_did_not_come_is_no_loss():
+    # with a majorant's depth of 0.001 all of 2048 scores are exp(-0.001) in one run of eight
+    found = through_nothing([np.exp(-0.001), 1.0003], [0.0, 0.2])
+    check_empty(*found, ROUNDING)
+    with pytest.raises(Failure, match="empty space takes"):
+        check_empty(*through_nothing([np.exp(-0.02), 1.0003], [0.0, 0.2]), ROUNDING)
+
+
+def test_what_does_not_vary_loses_nothing():
+    check_empty(*through_nothing([1.0, 1.0], [0.0, 0.0]), ROUNDING)
+    with pytest.raises(Failure, match="empty space takes"):
+        check_empty(*through_nothing([np.exp(-0.001), 1.0], [0.0, 0.0]), ROUNDING)
+
+
+def test_only_what_rounding_explains_may_violate_the_majorants_of_voxels():
+    allowed = violations_by_rounding(10**6, 8, ROUNDING, 1e-6)
+    assert 3 < allowed < 20
+    assert violations_by_rounding(10**6, 8, 2.0**-53, 1e-6) == 0
+
+    def found(violations, **others):
+        counters = {"truncated": 0, "nonfinite": 0, "violations": violations} | others
+        return SimpleNamespace(counters=counters)
+
+    check_clean(found(1), bounded=True, violations=allowed)
+    for one, more in ((found(1), 0), (found(allowed + 1), allowed), (found(1, truncated=1), 9)):
+        with pytest.raises(Failure, match="none of these may be counted"):
+            check_clean(one, bounded=True, violations=more)
