@@ -67,13 +67,18 @@ def violations_by_rounding(lookups: int, voxels: int, rounding: float, alpha: fl
     return int(stats.poisson.isf(alpha, 3.0 * lookups * voxels * rounding))
 
 
+def noise_of(moments: Moments, expected: Array) -> float:
+    """Standard error of the mean over all rays, relative to what is expected."""
+    return float(np.sqrt((moments.variance / moments.count).sum()) / expected.sum())
+
+
 def check_mean(moments: Moments, expected: Array, alpha: float) -> None:
     """z-tests of the mean of each group of rays.
 
     They must be able to tell something: weights that explode would hide behind their own variance.
     """
     square_error = moments.variance / moments.count
-    noise = np.sqrt(square_error.sum()) / expected.sum()
+    noise = noise_of(moments, expected)
     demand(noise < RESOLVED, f"mean: known to {noise:.2g} only")
     _require_groups(moments.mean, expected, square_error, expected, (alpha, "mean"))
 

@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from freepath.check import cases
 from freepath.check.identities import check_clean, check_empty, violations_by_rounding
 from freepath.check.verdict import Failure
 from freepath.stats import Moments
@@ -43,3 +44,20 @@ def test_only_what_rounding_explains_may_violate_the_majorants_of_voxels():
     for one, more in ((found(1), 0), (found(allowed + 1), allowed), (found(1, truncated=1), 9)):
         with pytest.raises(Failure, match="none of these may be counted"):
             check_clean(one, bounded=True, violations=more)
+
+
+@pytest.mark.parametrize(("variance", "blocks"), [(1.0, 1), (100.0, 8)])
+def test_a_mean_that_rare_weights_leave_unknown_gets_more_samples(variance, blocks):
+    taken = []
+
+    def record(samples, blocks=1):
+        taken.append(blocks)
+        moments = Moments(
+            samples * blocks, np.array([1.0]), np.array([variance * samples * blocks])
+        )
+        return SimpleNamespace(round=SimpleNamespace(moments=moments), score=np.zeros((1, samples)))
+
+    flight = SimpleNamespace(reference=lambda: np.array([1.0]), record=record)
+    found = cases._resolved(flight, record(COUNT))
+    assert taken == [1, 8][: 1 + (blocks > 1)]
+    assert found.round.moments.count == COUNT * blocks
