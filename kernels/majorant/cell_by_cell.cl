@@ -49,20 +49,26 @@ static void place_at_depth(Path *path, const Scene *scene, const real depth)
     path->crossings = probe.crossings;
 }
 
+/* The majorant's optical depth that lanes `walking` of a probe have before them, or the first of it from `enough` on. */
+static real walk_ahead(Path *probe, const Scene *scene, mask walking, const real enough)
+{
+    real depth = (real)0;
+    while (any_lane(walking)) {
+        const real plane = next_plane(probe, scene);
+        const real t_exit = smaller(plane, probe->length);
+        depth = choose(walking, depth + probe->majorant * (t_exit - probe->t), depth);
+        probe->t = choose(walking, t_exit, probe->t);
+        walking &= less(plane, probe->length) & less(depth, enough);
+        enter_next_cell(probe, scene, plane, walking);
+    }
+    return depth;
+}
+
 /* The majorant's optical depth of the whole ray, by a walk through all of its cells. */
 static real majorant_depth(Path *path, const Scene *scene)
 {
     Path probe = *path;
-    mask walking = (mask)-1;
-    real depth = (real)0;
-    while (any_lane(walking)) {
-        const real plane = next_plane(&probe, scene);
-        const real t_exit = smaller(plane, probe.length);
-        depth = choose(walking, depth + probe.majorant * (t_exit - probe.t), depth);
-        probe.t = choose(walking, t_exit, probe.t);
-        walking &= less(plane, probe.length);
-        enter_next_cell(&probe, scene, plane, walking);
-    }
+    const real depth = walk_ahead(&probe, scene, (mask)-1, (real)FAR);
     path->crossings = probe.crossings;
     return depth;
 }
@@ -78,16 +84,7 @@ static real majorant_depth_ahead(Path *path, const Scene *scene, const real whol
     if (!any_lane(walked))
         return ahead;
     Path probe = *path;
-    mask walking = walked;
-    real depth = (real)0;
-    while (any_lane(walking)) {
-        const real plane = next_plane(&probe, scene);
-        const real t_exit = smaller(plane, probe.length);
-        depth = choose(walking, depth + probe.majorant * (t_exit - probe.t), depth);
-        probe.t = choose(walking, t_exit, probe.t);
-        walking &= less(plane, probe.length) & less(depth, (real)BLACK);
-        enter_next_cell(&probe, scene, plane, walking);
-    }
+    const real depth = walk_ahead(&probe, scene, walked, (real)BLACK);
     path->crossings = probe.crossings;
     return choose(walked, depth, ahead);
 }
