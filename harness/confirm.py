@@ -38,7 +38,7 @@ REPEATS = 16
 """Repeats at least, so that their spread gives an interval; a multiple of TURNS."""
 STEP = 2
 """Between one sample count and the next. A repeat must not hold few samples: starting and ending a
-block takes the time of up to three, which the prediction leaves out."""
+block takes its time, whatever it holds, which the prediction leaves out."""
 LEAST_OF_MOST = 8
 """The largest sample count is no smaller."""
 UNITS = 1 << 19

@@ -61,8 +61,9 @@ class Stopping:
     def _error_is_known(self, variances: Sequence[float]) -> bool:
         """Whether the rounds that were planned are over, and, with patience, were enough.
 
-        Rare high scores may have kept out of the pilot's. Asked at few times only, each twice as
-        late as the one before, so that luck has few chances.
+        Rare high scores may have kept out of the pilot's. While they do not, twice as many rounds
+        are made before it is asked again, so that luck has few chances; a case that goes on for its
+        times alone is asked in each, which can only make it go on for longer.
         """
         wanted = self._rounds_for_error
         if wanted is None or len(variances) < wanted:
