@@ -17,16 +17,19 @@ from freepath.scene.cache import cache_dir
 FAILED_LAST = "LastTestsFailed.log"
 
 
-def write_junit(path: Path, by_device: dict[str, list[Outcome]]) -> None:
-    """A suite a device; raises UsageError where the file cannot be written."""
+def write_junit(path: Path | None, by_device: dict[str, list[Outcome]]) -> None:
+    """A suite a device, if there is a path; raises UsageError where it cannot be written."""
+    if path is None:
+        return
     from junitparser import Error, JUnitXml, Skipped, TestCase, TestSuite
     from junitparser import Failure as Wrong
 
     report = JUnitXml("freepath check")
     for device, outcomes in by_device.items():
-        suite = TestSuite(device)
+        suite, cases = TestSuite(device), []
         for outcome in outcomes:
-            case = TestCase(outcome.name, "freepath.check", outcome.seconds)
+            name = f"{outcome.name} (repeat {outcome.repeat})" if outcome.repeat else outcome.name
+            case = TestCase(name, "freepath.check", outcome.seconds)
             text = _printable(outcome.text)
             message = text.strip().splitlines()[-1] if text.strip() else outcome.status
             if outcome.status == SKIPPED:
@@ -35,7 +38,9 @@ def write_junit(path: Path, by_device: dict[str, list[Outcome]]) -> None:
                 kind = Wrong if outcome.status == FAILED else Error
                 case.result = [kind(message, outcome.status)]
                 case.system_out = text
-            suite.add_testcase(case)
+            cases.append(case)
+        # all at once: each call counts the whole suite again
+        suite.add_testcases(cases)
         report.add_testsuite(suite)
     report.update_statistics()
     with _written(path):

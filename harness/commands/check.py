@@ -200,6 +200,8 @@ def _run(options: Namespace, chosen: list[tuple[int, Check]]) -> int:
         ),
         _tell,
     )
+    # a file that cannot be written is told before hours of checks, not after
+    files.write_junit(options.output_junit, running.outcomes)
     unusable: list[str] = []
     try:
         if parts:
@@ -212,8 +214,7 @@ def _run(options: Namespace, chosen: list[tuple[int, Check]]) -> int:
             everywhere.write(options.outcomes, running.outcomes, unusable)
         else:
             files.keep_failed(running.failed)
-        if options.output_junit:
-            files.write_junit(options.output_junit, running.outcomes)
+        files.write_junit(options.output_junit, running.outcomes)
     return _judge(options, running, unusable)
 
 

@@ -9,7 +9,7 @@ import time
 from xml.etree import ElementTree
 
 import pytest
-from freepath.check import printing, session
+from freepath.check import files, printing, session
 from freepath.check.model import Check
 from freepath.check.outcome import Outcome
 from freepath.check.pool import Pool, Task
@@ -55,6 +55,26 @@ def test_passed(call, selector):
     assert "100% tests passed, 0 tests failed out of 3" in out
     (suite,) = ElementTree.parse("junit.xml").getroot()
     assert (suite.get("tests"), suite.get("failures")) == ("3", "0")
+
+
+def test_a_report_that_cannot_be_written_is_told_first(call, selector, work):
+    (work / "file").write_text("")
+    code, out, err = call("-d", selector, "-R", QUICK, "--output-junit", "file/junit.xml")
+    assert code == 2
+    assert "file/junit.xml: cannot be written" in err
+    assert "Start" not in out
+
+
+def test_a_report_of_many_repeats(tmp_path):
+    """Each outcome is counted once, not again for every one that follows."""
+    names = [f"check-{number}" for number in range(1000)]
+    outcomes = [Outcome(1, n, ("fast",), "Passed", 0.1, repeat=r) for r in range(20) for n in names]
+    started = time.process_time()
+    files.write_junit(tmp_path / "junit.xml", {"device": outcomes})
+    assert time.process_time() - started < 20.0
+    (suite,) = ElementTree.parse(tmp_path / "junit.xml").getroot()
+    assert suite.get("tests") == "20000"
+    assert len({case.get("name") for case in suite}) == 20000
 
 
 @pytest.fixture
