@@ -24,7 +24,7 @@ from freepath.check.suite.common import everyone, homogeneous
 from freepath.check.verdict import NotApplicable
 from freepath.device import Device, DeviceInfo
 from freepath.errors import CatalogError
-from freepath.report.data import Report
+from freepath.report.data import Report, known_to
 from freepath.results import CHECKS, ResultFolder
 from freepath.table import seconds
 
@@ -196,19 +196,14 @@ class Standing:
         mine = f"1 % after {seconds(self.own['t1'])} ({self.own['method']})"
         if self.other is None:
             return f"pays: {mine}, and none of its relatives reaches it"
-        factor, noise = self.other["t1"] / self.own["t1"], _noise(self.own, self.other)
+        factor = self.other["t1"] / self.own["t1"]
+        noise = math.hypot(known_to(self.own, "t1"), known_to(self.other, "t1"))
         text = f"{mine}; {self.other['method']} after {seconds(self.other['t1'])}"
         if abs(math.log(factor)) <= noise:
             return f"pays nothing and costs nothing, within {100 * noise:.0f} %: {text}"
         if factor > 1:
             return f"pays: {factor:.2f} times as fast, known to {100 * noise:.0f} %: {text}"
         return f"does not pay: takes {1 / factor:.2f} times as long: {text}"
-
-
-def _noise(*rows: dict[str, Any]) -> float:
-    """Half the 95 % interval of a ratio of times to 1 %, relative to it."""
-    parts = [row[name] for row in rows for name in ("tn", "vn")]
-    return math.hypot(*(1.0 if part is None else part for part in parts))
 
 
 def standings(report: Report, tracker: Tracker) -> list[Standing]:

@@ -18,6 +18,7 @@ from freepath.device import Device
 from freepath.errors import NothingMatchedError, RunError
 from freepath.results import ResultFolder
 from freepath.scene.volumes import read_volume
+from freepath.stats import uncertainty
 from freepath.table import number
 from scipy import stats
 
@@ -199,9 +200,9 @@ def needed(row: dict[str, str], accuracy: float) -> tuple[float, float] | None:
     if variance is None or not scale or not time:
         return None
     room = (accuracy * scale) ** 2 - (number(row, "bias_rms") or 0.0) ** 2
-    parts = [number(row, "time_noise"), number(row, "variance_noise") if variance else 0.0]
-    noise = math.hypot(*(1.0 if part is None else part for part in parts))
-    return (time * max(1.0, variance / room) if room > 0 else math.inf), noise
+    needs = time * max(1.0, variance / room) if room > 0 else math.inf
+    noises = number(row, "time_noise"), number(row, "variance_noise")
+    return needs, uncertainty(needs, time, *noises)
 
 
 def majorants_of(shape: Sequence[int]) -> list[Any]:

@@ -6,11 +6,14 @@ import math
 from collections import Counter, defaultdict
 from collections.abc import Iterable
 
+from freepath.stats import soonest, uncertainty
 from rich.markup import escape
 from rich.table import Table
 
 Row = dict[str, str]
 PREFIXES = ((1e-12, "p"), (1e-9, "n"), (1e-6, "u"), (1e-3, "m"), (1.0, ""))
+ROUGH = 0.2
+"""A time to an accuracy of which half the 95 % interval is more, relative to it, is marked."""
 CLOSE = 0.1
 """A prediction that is no further from the measurement, relative to it, holds."""
 FAILED = ("invalid", "build_failed", "run_failed", "timeout", "crashed", "mismatch")
@@ -18,8 +21,8 @@ FAILED = ("invalid", "build_failed", "run_failed", "timeout", "crashed", "mismat
 LEGEND = (
     "time: device time a sample. occ.: lanes at work. rel. var.: variance of one sample over the\n"
     "squared reference. bias: of the reference, with its 95 % interval. to 1%: device time a ray\n"
-    "for a relative RMSE of 1 %; * the soonest, and what is not significantly later. Without a\n"
-    "reference (?) the estimate stands in for it."
+    "for a relative RMSE of 1 %, ~ if it is not known to 20 %; * the soonest, and what is not\n"
+    "significantly later. Without a reference (?) the estimate stands in for it."
 )
 
 
@@ -85,25 +88,24 @@ def tracker_label(row: Row) -> str:
     return row["case"].split("/")[-3]
 
 
+def marked(value: float | None, uncertain: float) -> str:
+    """A time to an accuracy, with "~" if it is known roughly."""
+    finite = value is not None and math.isfinite(value)
+    return ("~" if finite and uncertain > ROUGH else "") + seconds(value)
+
+
 def _time_to_1pct(row: Row) -> tuple[float, float]:
-    """The time to 1 % and half the width of its 95 % interval: it is variance times time."""
-    value = number(row, "time_to_1pct_s")
-    noises = [number(row, column) for column in ("time_noise", "variance_noise")]
-    return value, value * math.hypot(*(1.0 if noise is None else noise for noise in noises))
+    """The time to 1 % and half its 95 % interval, relative to it."""
+    columns = ("time_to_1pct_s", "time_per_sample_s", "time_noise", "variance_noise")
+    value, *others = (number(row, column) for column in columns)
+    return value, uncertainty(value, *others)
 
 
 def best_of(rows: Iterable[Row]) -> list[Row]:
     """The rows of a group that reach 1 % soonest, and those not significantly later."""
     finite = [r for r in rows if r["status"] == "ok" and r["time_to_1pct_s"] not in ("", "inf")]
-    if not finite:
-        return []
-    least, width = min(map(_time_to_1pct, finite))
-    best = []
-    for row in finite:
-        value, other = _time_to_1pct(row)
-        if value - least <= math.hypot(width, other):
-            best.append(row)
-    return best
+    places = soonest([_time_to_1pct(row) for row in finite])
+    return [finite[place] for place in sorted(places)]
 
 
 def bias(row: Row) -> str:
@@ -143,6 +145,10 @@ def _lanes(row: Row) -> str:
     return " ".join([row["lanes"], *unusual])
 
 
+def _ladder_cell(row: Row) -> str:
+    return marked(*_time_to_1pct(row)) if row["time_to_1pct_s"] else ""
+
+
 def _cells(row: Row, *, best: bool) -> list[str]:
     lanes = _lanes(row)
     if row["status"] != "ok":
@@ -158,7 +164,7 @@ def _cells(row: Row, *, best: bool) -> list[str]:
         f"{100 * number(row, 'lane_occupancy'):.0f}%",
         short(variance / reference**2 if reference else None),
         bias(row),
-        seconds(number(row, "time_to_1pct_s")) + (" [bold green]*[/]" if best else "  "),
+        _ladder_cell(row) + (" [bold green]*[/]" if best else "  "),
     ]
 
 

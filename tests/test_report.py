@@ -92,6 +92,7 @@ def result(tmp_path):
         for i, tracker in enumerate(("delta", "ratio", EVIL.replace("/", "")))
         for j, tightness in enumerate((1.0, 2.0, 4.0))
     ]
+    rows[-1] |= {"variance_noise": "0.5", "time_to_10pct_s": rows[-1]["time_per_sample_s"]}
     rows.append(row_of(99, "march", status="mismatch", reason="off"))
     other = [row | {"device": "other"} for row in rows[:3]]
     return result_of(tmp_path / "result", rows + other, [CONFIRMED])
@@ -173,6 +174,19 @@ def test_markdown_names_the_soonest(result):
     line = next(line for line in text.splitlines() if line.startswith("| transmittance, cloud"))
     assert "10 ms, delta, global x1" in line
     assert "<script" not in text.replace("\\<", "")
+
+
+def test_what_is_known_roughly_is_marked_and_ties_are_counted(tmp_path):
+    """Other times of the ladder are those of a single sample, in which there is no variance."""
+    rough = {"variance_noise": "0.5", "time_to_10pct_s": "1e-06", "time_to_1pct_s": "0.0099"}
+    rows = [row_of(1, "delta", **rough), row_of(2, "ratio"), row_of(3, "split", seconds=1e-5)]
+    report = load([result_of(tmp_path / "result", rows)])
+    assert [row["rough"] for row in report.rows] == [["t1"], [], []]
+    lines = markdown(report).splitlines()
+    soonest = next(line for line in lines if line.startswith("| transmittance, cloud"))
+    assert "| ~9.9 ms, delta, global x1 (not significantly later: 1 more) |" in soonest
+    (case,) = (line for line in lines if line.startswith("| delta"))
+    assert case.endswith("| 1 us | ~9.9 ms | never |")
 
 
 def test_markdown_and_what_is_asked_for_is_printed(result, capfdbinary):
@@ -262,6 +276,8 @@ def test_the_page(result, opened):
     assert times[0] == "1 us"
     page.locator("#head th", has_text="time").click()
     assert column(page, 1 + page.locator("#head th").all_inner_texts().index("time"))[0] == "5 us"
+    place = 1 + page.locator("#head th").all_inner_texts().index("to 1 %")
+    assert [text for text in column(page, place) if "~" in text] == ["~50 ms"]
     page.fill("#filter", "ratio -x4")
     page.wait_for_function("document.querySelectorAll('#body tr').length === 2")
     assert all("ratio" in text for text in column(page, 1))

@@ -140,6 +140,21 @@ def test_what_is_not_significantly_later_is_marked_too():
     assert best(times("0.0015", "0.001", noise="")) == ["0", "1"]
 
 
+def test_a_time_that_is_known_roughly_is_marked():
+    def shown(noise, **columns):
+        (row,) = times("0.0002", noise=noise)
+        return text_of([row | columns]).splitlines()[-1]
+
+    assert "~" not in shown("0.19")
+    for noise in ("0.21", ""):
+        assert " ~200 us" in shown(noise)
+    assert " ~200 us" in shown("0.01", time_noise="0.3")
+    # the time of a sample is the least: no variance is in it
+    assert "~" not in shown("0.9", time_per_sample_s="0.0002")
+    assert "~" not in shown("0.9", time_to_1pct_s="inf")
+    assert "~" not in shown("0.9", time_to_1pct_s="")
+
+
 def test_what_never_gets_there_is_never_the_best():
     assert best(times("inf", "")) == []
     assert best(times("inf", "3.0", "")) == ["1"]

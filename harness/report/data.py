@@ -11,7 +11,8 @@ from typing import Any
 
 from freepath.errors import FreepathError
 from freepath.results import CHECKS, CONFIRM, CONFIRM_COLUMNS, RUN, SUMMARY, read_rows
-from freepath.table import Row, along, bounces, lit, number, tracker_label
+from freepath.stats import uncertainty
+from freepath.table import ROUGH, Row, along, bounces, lit, number, tracker_label
 
 DEEPEST, HIGHEST = 1e-4, 10.0
 """Relative errors between which curves are drawn."""
@@ -157,7 +158,15 @@ def _record(row: Row, variants: list[tuple[str, str]], device: str) -> dict[str,
         "tn": number(row, "time_noise"),
         "vn": number(row, "variance_noise"),
     }
-    return record | _errors(row) | {name: _time(row[column]) for name, column in LADDER.items()}
+    record |= _errors(row) | {name: _time(row[column]) for name, column in LADDER.items()}
+    return record | {"rough": [name for name in LADDER if known_to(record, name) > ROUGH]}
+
+
+def known_to(record: dict[str, Any], name: str) -> float:
+    """Half the 95 % interval of a time of the ladder, relative to it; 0 where there is no time."""
+    if not isinstance(record[name], float):
+        return 0.0
+    return uncertainty(record[name], record["t"], record["tn"], record["vn"])
 
 
 def _question(row: Row, *light: str) -> str:

@@ -17,6 +17,7 @@
     const [scale, prefix] = prefixes.find(([one]) => value < 999.5 * one) ?? prefixes[4];
     return `${Number((value / scale).toPrecision(3))} ${prefix}s`;
   };
+  const until = (row, name) => (row.rough.includes(name) ? "~" : "") + seconds(row[name]);
   const short = (value) => (value === null ? "" : String(Number(value.toPrecision(3))));
   const percent = (value) => (value === null ? "" : `${(100 * value).toFixed(0)}%`);
   const signed = (row) => row.bias === null ? "" :
@@ -27,8 +28,8 @@
     ["storage", "storage", (row) => row.storage, true], ["lookups", "lookups", (row) => short(row.lookups)],
     ["time", "t", (row) => seconds(row.t)], ["occ.", "occupancy", (row) => percent(row.occupancy)],
     ["rel. var.", "v", (row) => short(row.v)], ["bias", "bias", signed],
-    ["to 10 %", "t10", (row) => seconds(row.t10)], ["to 1 %", "t1", (row) => seconds(row.t1)],
-    ["to 0.1 %", "t01", (row) => seconds(row.t01)], ["medium", "q", (row) => row.q, true],
+    ["to 10 %", "t10", (row) => until(row, "t10")], ["to 1 %", "t1", (row) => until(row, "t1")],
+    ["to 0.1 %", "t01", (row) => until(row, "t01")], ["medium", "q", (row) => row.q, true],
     ["device", "device", (row) => row.device, true], ["status", "status", (row) => row.status, true],
   ].filter(([, field]) => !["device", "arithmetic", "storage", "q", "status"].includes(field) || new Set(rows.map((row) => row[field])).size > 1);
 

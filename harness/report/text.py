@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from freepath.report.data import LADDER, Report
-from freepath.table import seconds, short
+from freepath.report.data import LADDER, Report, known_to
+from freepath.stats import soonest
+from freepath.table import marked, seconds, short
 from rich.markup import escape
 from rich.table import Table
 
@@ -23,11 +24,18 @@ def winners(report: Report) -> list[list[str]]:
     for (question, device), rows in found.items():
         cells = [question, device]
         for name in TARGETS:
-            reaching = [row for row in rows if isinstance(row[name], float)]
-            best = min(reaching, key=lambda row, name=name: row[name], default=None)
-            cells.append(f"{seconds(best[name])}, {best['method']}" if best else "none")
+            cells.append(_winner([row for row in rows if isinstance(row[name], float)], name))
         lines.append(cells)
     return lines
+
+
+def _winner(reaching: list[dict[str, Any]], name: str) -> str:
+    places = soonest([(row[name], known_to(row, name)) for row in reaching])
+    if not places:
+        return "none"
+    best, others = reaching[places[0]], len(places) - 1
+    also = f" (not significantly later: {others} more)" if others else ""
+    return f"{_time(best, name)}, {best['method']}{also}"
 
 
 def summary(report: Report) -> Table:
@@ -45,8 +53,9 @@ def summary(report: Report) -> Table:
     return table
 
 
-def _time(value: float | str | None) -> str:
-    return seconds(math.inf if value == "never" else value)
+def _time(row: dict[str, Any], name: str) -> str:
+    value = math.inf if row[name] == "never" else row[name]
+    return marked(value, known_to(row, name))
 
 
 def cells(row: dict[str, Any]) -> list[str]:
@@ -63,7 +72,7 @@ def cells(row: dict[str, Any]) -> list[str]:
         f"{100 * row['occupancy']:.0f}%",
         short(row["v"]),
         bias,
-        *(_time(row[name]) for name in TARGETS),
+        *(_time(row, name) for name in TARGETS),
     ]
 
 
