@@ -199,18 +199,22 @@ class Bench:
 
 
 def interleave(
-    benches: Iterable[Bench], seed: int, on_error: Callable[[Bench, RunError], None]
+    benches: Iterable[Bench],
+    seed: int,
+    on_error: Callable[[Bench, RunError], None],
+    on_turn: Callable[[Bench], None] = lambda bench: None,
 ) -> Iterator[Bench]:
     """Run rounds of all cases in random order, anew in each pass; yields the bench of each round.
 
-    A drift of the machine then hits all cases of a pass alike. A case whose launch fails is told to
-    on_error and given up.
+    A drift of the machine then hits all cases of a pass alike. A case whose launch fails is told
+    to on_error and given up; on_turn is told whose turn it is, before its round.
     """
     random = np.random.default_rng(seed)
     active = list(benches)
     while active:
         for place in random.permutation(len(active)).tolist():
             bench = active[place]
+            on_turn(bench)
             try:
                 bench.step()
             except RunError as error:

@@ -18,8 +18,7 @@ from freepath.device import Device
 from freepath.errors import NothingMatchedError, RunError
 from freepath.results import ResultFolder
 from freepath.scene.volumes import read_volume
-from freepath.stats import uncertainty
-from freepath.table import number
+from freepath.table import number, uncertainty
 from scipy import stats
 
 SEED = 7

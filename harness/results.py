@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from freepath.errors import FreepathError
+from freepath.journal import Journal
 
 SCHEMA_VERSION = 4
 SUMMARY, SAMPLES, CONFIRM, RUN = "summary.csv", "samples.csv", "confirm.csv", "run.json"
@@ -60,7 +61,7 @@ KEY = (*PLACE, "driver_version", "config_sha256", "source_sha256")
 """A row of an interrupted run stands if all of these are what they would be now."""
 SESSION = (*PLACE, "run_id")
 """What the rows of a case's rounds have in common with its own row."""
-FINAL = ("ok", "skipped", "invalid", "mismatch")
+FINAL = ("ok", "skipped", "invalid", "mismatch", "crashed")
 """Statuses that running again would only repeat."""
 
 Row = dict[str, str]
@@ -79,6 +80,7 @@ class ResultFolder:
         self._resume = resume
         self._confirm = confirm
         self._lock: Any = None
+        self.journal = Journal(folder)
         try:
             if folder.exists() and not folder.is_dir():
                 raise FreepathError(f"{folder}: is a file, expected a folder for the results")
@@ -112,6 +114,7 @@ class ResultFolder:
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
             self._acquire()
+            self.journal.open()
             old = self.rows() if self._resume else []
             predicted = self._old(CONFIRM, CONFIRM_COLUMNS)
             needed = {_of(row, SESSION) for row in predicted} if self._confirm else None
@@ -151,6 +154,7 @@ class ResultFolder:
     def close(self) -> None:
         """Let others write here."""
         if self._lock:
+            self.journal.close()
             (self.folder / LOCK).unlink(missing_ok=True)
             self._lock.release()
 
@@ -179,6 +183,7 @@ class ResultFolder:
         if self._confirm:
             self._append(CONFIRM, CONFIRM_COLUMNS, confirmed)
         self._append(SUMMARY, COLUMNS, [row])
+        self.journal.done(_of(row, PLACE))
 
     def _append(self, name: str, columns: tuple[str, ...], rows: Iterable[Mapping]) -> None:
         texts = [{column: _text(row[column]) for column in columns} for row in rows]

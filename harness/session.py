@@ -161,10 +161,15 @@ class Run:
         return [sweep.plan(case, scenes[scene_key(case)].for_device(info)) for case in self.cases]
 
     def _run(self, sweep: Sweep, scenes: dict[str, Scene], jobs: list[Job]) -> None:
+        suspects = [job for job in jobs if sweep.deaths_at(job)]
+        others = [job for job in jobs if not sweep.deaths_at(job)]
+        groups = [[job for job in others if scene_key(job.case) == key] for key in scenes]
+        # alone, and after the others: a process that ends at one again takes none of them with it
+        groups += [[job] for job in suspects]
         try:
-            for key, scene in scenes.items():
-                group = [job for job in jobs if scene_key(job.case) == key]
-                sweep.run(scene.for_device(sweep.device.info), group, self.config.seed)
+            for group in filter(None, groups):
+                scene = scenes[scene_key(group[0].case)].for_device(sweep.device.info)
+                sweep.run(scene, group, self.config.seed)
         finally:
             self.clock.build_s += sweep.time_build_s
             self.clock.device_s += sweep.time_confirming_s

@@ -12,16 +12,21 @@ from freepath.catalog import Catalog
 from freepath.confirm import SETTLED, confirmed_rows
 from freepath.device import Device, Program
 from freepath.errors import BuildError, DriverLimitError, FreepathError, RunError
+from freepath.journal import TWICE
 from freepath.measure import Bench, interleave
 from freepath.pictures import COMPARED, write_pictures
 from freepath.plan import Case
-from freepath.results import ResultFolder
+from freepath.results import ResultFolder, key_of
 from freepath.rows import base_row, effects_of, measured_row, round_rows
 from freepath.runner import KernelData
 from freepath.source import Source, Structure
 from freepath.stopping import Rule
 
 REASON_LENGTH = 300
+CRASHED = {
+    "status": "crashed",
+    "reason": f"the process ended {TWICE} times while this case was built or run",
+}
 
 
 @dataclass(eq=False)
@@ -95,15 +100,21 @@ class Sweep:
     def _structure(self, case: Case, scene: Scene, *, count: bool) -> Structure:
         return structure_of(case, self.catalog, scene.medium, self.device, count=count)
 
+    def deaths_at(self, job: Job) -> int:
+        """How often the process of this run ended while this case was at work."""
+        return self.folder.journal.deaths_at(key_of(job.row))
+
     def run(self, scene: Scene, jobs: list[Job], seed: int) -> None:
         """Build and measure the jobs of one scene side by side; each row is written as it ends."""
+        given_up = [job for job in jobs if self.deaths_at(job) >= TWICE]
         for job in jobs:
-            if job.timed is None:
-                self._finish(job, job.row)
-        jobs = [job for job in jobs if job.timed is not None]
+            if job.timed is None or job in given_up:
+                self._finish(job, job.row | (CRASHED if job in given_up else {}))
+        jobs = [job for job in jobs if job.timed is not None and job not in given_up]
         data: dict[tuple[str, str], KernelData] = {}
         for place, job in enumerate(jobs, 1):
             self.on_progress(0.0, f"building {place}/{len(jobs)}")
+            self.folder.journal.work_at(key_of(job.row))
             try:
                 self._prepare(job, scene, data)
             except (BuildError, RunError) as error:
@@ -159,10 +170,13 @@ class Sweep:
             scene.reference(job.case)
             scene.as_stored(job.case).reference(job.case)
 
+        def on_turn(bench: Bench) -> None:
+            self.folder.journal.work_at(key_of(by_bench[bench].row))
+
         def on_error(bench: Bench, error: RunError) -> None:
             self._fail(by_bench[bench], error)
 
-        for bench in interleave(by_bench, seed, on_error):
+        for bench in interleave(by_bench, seed, on_error, on_turn):
             if bench.measurement.stopped:
                 self._measured(by_bench[bench], scene)
             open_ones = [b for b in by_bench if not b.measurement.stopped]

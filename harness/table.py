@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 from collections import Counter, defaultdict
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
-from freepath.stats import soonest, uncertainty
 from rich.markup import escape
 from rich.table import Table
 
@@ -86,6 +85,32 @@ def tracker_label(row: Row) -> str:
     That name is estimand/medium[/majorant/tightness]/tracker/lanes/arithmetic.
     """
     return row["case"].split("/")[-3]
+
+
+def uncertainty(
+    time: float, per_sample: float, time_noise: float | None, variance_noise: float | None
+) -> float:
+    """Half the 95 % interval of a time to an accuracy, relative to it.
+
+    It is variance x time of a sample over a constant; in that of one sample, the least, there is no
+    variance. The noises are relative too; one that is not known (None) is taken for the whole.
+    """
+    noises = [time_noise] if time <= per_sample else [time_noise, variance_noise]
+    return math.hypot(*(1.0 if noise is None else noise for noise in noises))
+
+
+def soonest(times: Sequence[tuple[float, float]]) -> list[int]:
+    """The places of the least of (time, its uncertainty), and of those not significantly later.
+
+    In the order of times, the least first.
+    """
+    order = sorted(range(len(times)), key=lambda place: times[place])
+    widths = [time * relative for time, relative in times]
+    return [
+        place
+        for place in order
+        if times[place][0] - times[order[0]][0] <= math.hypot(widths[place], widths[order[0]])
+    ]
 
 
 def marked(value: float | None, uncertain: float) -> str:

@@ -24,7 +24,7 @@ ORDER = (
     ("device",),
     ("limits", "selection"),
     ("runner",),
-    ("measure",),
+    ("measure", "journal"),
     ("results",),
     ("rows", "table", "binding", "confirm", "pictures"),
     ("equal_time", "report", "compare"),
@@ -43,7 +43,8 @@ ONLY_CSV = {
     # the pictures of a run are files beside its CSV
     "report": {"errors", "results", "table", "report", "version", "pictures"},
     "compare": {"errors", "results", "table", "compare"},
-    "results": {"errors"},
+    "results": {"errors", "journal"},
+    "journal": {"errors"},
 }
 """What modules may import that work on rows of CSV and on nothing else."""
 

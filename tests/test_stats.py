@@ -9,8 +9,6 @@ from freepath.stats import (
     accuracy,
     merge_blocks,
     relative_half_width,
-    soonest,
-    uncertainty,
 )
 
 
@@ -175,31 +173,6 @@ def test_the_ladder_is_what_more_samples_give():
     seconds = found.time_to(0.01, 1e-6)
     samples = seconds / 1e-6
     assert math.sqrt(found.variance / samples + found.bias_rms**2) == pytest.approx(0.005)
-
-
-def test_how_well_a_time_is_known():
-    assert uncertainty(2.0, 1.0, 0.03, 0.04) == pytest.approx(0.05)
-    assert uncertainty(1.0, 1.0, 0.03, 0.04) == pytest.approx(0.03)
-    assert uncertainty(2.0, 1.0, 0.03, None) > 1.0
-
-
-def test_the_soonest_and_what_is_not_significantly_later():
-    assert soonest([]) == []
-    assert soonest([(1.2, 0.01), (1.0, 0.01), (1.01, 0.01)]) == [1, 2]
-    # an interval that is wide enough reaches down to the least, and one of the least up
-    assert soonest([(1.2, 0.2), (1.0, 0.0)]) == [1, 0]
-    assert soonest([(1.2, 0.0), (1.0, 0.2), (1.21, 0.0)]) == [1, 0]
-
-
-def test_the_chance_that_the_truly_soonest_is_named():
-    """Of two that differ by what their intervals tell, the later one is left out as it should."""
-    random = np.random.default_rng(3)
-    truth, relative = np.array([1.0, 1.0, 1.5]), 0.1
-    found = truth * (1.0 + random.normal(size=(2000, 3)) * relative / 1.96)
-    named = [soonest([(time, relative) for time in times]) for times in found.tolist()]
-    missed = sum(not {0, 1} <= set(places) for places in named)
-    assert 60 < missed < 140  # 5 % of intervals of a difference of two
-    assert sum(2 in places for places in named) == 0
 
 
 def test_what_contradicts_a_reference():

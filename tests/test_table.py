@@ -1,6 +1,7 @@
 import io
 import math
 
+import numpy as np
 import pytest
 from freepath import table
 from freepath.results import COLUMNS
@@ -225,3 +226,28 @@ def test_groups_keep_devices_and_questions_apart():
 
 def test_arithmetic_stands_beside_lanes_where_it_is_not_strict():
     assert "16 fast" in text_of([row_of(arithmetic="fast")])
+
+
+def test_how_well_a_time_is_known():
+    assert table.uncertainty(2.0, 1.0, 0.03, 0.04) == pytest.approx(0.05)
+    assert table.uncertainty(1.0, 1.0, 0.03, 0.04) == pytest.approx(0.03)
+    assert table.uncertainty(2.0, 1.0, 0.03, None) > 1.0
+
+
+def test_the_soonest_and_what_is_not_significantly_later():
+    assert table.soonest([]) == []
+    assert table.soonest([(1.2, 0.01), (1.0, 0.01), (1.01, 0.01)]) == [1, 2]
+    # an interval that is wide enough reaches down to the least, and one of the least up
+    assert table.soonest([(1.2, 0.2), (1.0, 0.0)]) == [1, 0]
+    assert table.soonest([(1.2, 0.0), (1.0, 0.2), (1.21, 0.0)]) == [1, 0]
+
+
+def test_the_chance_that_the_truly_soonest_is_named():
+    """Two that take the same are told apart as rarely as their intervals say."""
+    random = np.random.default_rng(3)
+    truth, relative = np.array([1.0, 1.0, 1.5]), 0.1
+    found = truth * (1.0 + random.normal(size=(2000, 3)) * relative / 1.96)
+    named = [table.soonest([(time, relative) for time in times]) for times in found.tolist()]
+    missed = sum(not {0, 1} <= set(places) for places in named)
+    assert 60 < missed < 140  # 5 % of intervals of a difference of two
+    assert sum(2 in places for places in named) == 0

@@ -11,8 +11,7 @@ from typing import Any
 
 from freepath.errors import FreepathError
 from freepath.results import CHECKS, CONFIRM, CONFIRM_COLUMNS, RUN, SUMMARY, read_rows
-from freepath.stats import uncertainty
-from freepath.table import ROUGH, Row, along, bounces, lit, number, tracker_label
+from freepath.table import ROUGH, Row, along, bounces, lit, number, tracker_label, uncertainty
 
 DEEPEST, HIGHEST = 1e-4, 10.0
 """Relative errors between which curves are drawn."""

@@ -6,8 +6,7 @@ import math
 from typing import Any
 
 from freepath.report.data import LADDER, Report, known_to
-from freepath.stats import soonest
-from freepath.table import marked, seconds, short
+from freepath.table import marked, seconds, short, soonest
 from rich.markup import escape
 from rich.table import Table
 
