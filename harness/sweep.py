@@ -25,7 +25,8 @@ from freepath.stopping import Rule
 REASON_LENGTH = 300
 CRASHED = {
     "status": "crashed",
-    "reason": f"the process ended {TWICE} times while this case was built or run",
+    "reason": f"the process ended {TWICE} times while this case was built or run; "
+    "a run into another folder tries it again",
 }
 
 

@@ -392,7 +392,7 @@ def test_a_reader_that_has_seen_enough(words):
 LONG = SWEEP.replace("{samples: 20}", "{at_most: 40 s, error: 0.0001%, time_noise: 100%}")
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_an_interrupted_run_can_be_completed(call, work, selector, number):
     (work / "long.yaml").write_text(LONG)
     given = ["run", "long.yaml", "-d", selector, "-o", "out"]
