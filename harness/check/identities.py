@@ -17,6 +17,7 @@ from scipy import stats
 Array = NDArray[np.float64]
 
 RESOLVED = 0.05  # relative standard error of a mean that says something
+EVENTS = 16  # of a ray, at least, that can tell whether samples depend on each other
 GROUPS = 8  # of rays with like expectations: errors of thin and of thick rays must not cancel
 
 
@@ -119,17 +120,25 @@ def check_empty(moments: Moments, depth: Array, rounding: float) -> None:
 def check_independence(scores: Array, alpha: float) -> None:
     """Samples (rays, samples) have nothing to do with those of other rays, nor with each other.
 
-    If they had not, sums over rays would vary more or less than by the sum of the variances, and
-    neighbouring samples of a ray would correlate. Both have a normal distribution, for many rays.
+    If they had not, sums over rays would vary more or less than each ray does, and neighbouring
+    samples of a ray would correlate. Every ray counts alike, or the one of the largest variance
+    might be all there is; a ray of a few high scores tells nothing, wherever they happen to be.
     """
     deviation = scores - scores.mean(axis=1, keepdims=True)
-    count, variance = scores.shape[1], deviation.var(axis=1)
-    total = variance.sum()
-    excess = (deviation.sum(axis=0) ** 2).mean() / total - 1.0
-    products = (deviation[:, 1:] * deviation[:, :-1]).mean(axis=1)
-    serial = products.sum() / np.sqrt((variance**2).sum() / count)
-    z = np.array([excess / np.sqrt(2.0 / count), serial])
-    require(2.0 * stats.norm.sf(np.abs(z)), alpha, "independence (of rays, of samples)")
+    spread = deviation.std(axis=1, keepdims=True)
+    deviation /= np.where(spread > 0.0, spread, np.inf)
+    # n equal scores among zeros have a kurtosis of count / n
+    kurtosis = (deviation**4).mean(axis=1)
+    deviation = deviation[(kurtosis > 0.0) & (kurtosis < scores.shape[1] / EVENTS)]
+    rays, count = deviation.shape
+    if rays < 2:
+        return
+    # as many sums as samples, each normal for many rays: their squares add up to a chi-square
+    square = (deviation.sum(axis=0) ** 2).mean() / rays * (count - 1)
+    tails = stats.chi2.cdf(square, count - 1), stats.chi2.sf(square, count - 1)
+    serial = (deviation[:, 1:] * deviation[:, :-1]).sum() / np.sqrt(rays * count)
+    p_values = np.minimum([2.0 * min(tails), 2.0 * stats.norm.sf(abs(serial))], 1.0)
+    require(p_values, alpha, "independence (of rays, of samples)")
 
 
 def check_inversion(

@@ -5,7 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from freepath.check import cases
-from freepath.check.identities import check_clean, check_empty, violations_by_rounding
+from freepath.check.identities import (
+    check_clean,
+    check_empty,
+    check_independence,
+    violations_by_rounding,
+)
 from freepath.check.verdict import Failure
 from freepath.stats import Moments
 
@@ -61,3 +66,51 @@ def test_a_mean_that_rare_weights_leave_unknown_gets_more_samples(variance, bloc
     found = cases._resolved(flight, record(COUNT))
     assert taken == [1, 8][: 1 + (blocks > 1)]
     assert found.round.moments.count == COUNT * blocks
+
+
+RAYS, ALPHA = 128, 1e-6
+
+
+def scores(seed, rays=RAYS, count=COUNT):
+    """Skewed as those of rays of different depth are, some next to never and some often hit."""
+    random = np.random.default_rng(seed)
+    chance = np.geomspace(1e-3, 0.9, rays)[:, None]
+    return (random.random((rays, count)) < chance) * random.exponential(size=(rays, count))
+
+
+def test_two_high_scores_in_a_row_are_no_dependence():
+    """The ray varies more than all others together: it was all that the test saw."""
+    found = scores(1)
+    found[0] = 1.0
+    found[0, [5, 6, 90, 700, 1200]] = 100.0
+    check_independence(found, ALPHA)
+
+
+def test_no_ray_that_varies_is_nothing_to_test():
+    check_independence(np.ones((RAYS, COUNT)), ALPHA)
+
+
+def test_independence_is_rejected_as_often_as_it_says():
+    rejected = 0
+    for seed in range(400):
+        try:
+            check_independence(scores(seed, count=512), 0.05)
+        except Failure:
+            rejected += 1
+    assert 6 <= rejected <= 40  # 20 expected; beyond has a chance of 1 in 10,000
+
+
+@pytest.mark.parametrize("shared", [0.3, 1.0])
+def test_rays_that_share_their_numbers_are_found(shared):
+    found = scores(2)
+    cut = int(shared * COUNT)
+    found[1::2, :cut] = found[::2, :cut]
+    with pytest.raises(Failure, match="independence"):
+        check_independence(found, ALPHA)
+
+
+def test_samples_that_share_their_numbers_are_found():
+    found = scores(3)
+    found[:, 1:200:2] = found[:, :200:2]
+    with pytest.raises(Failure, match="independence"):
+        check_independence(found, ALPHA)
