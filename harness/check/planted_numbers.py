@@ -38,6 +38,12 @@ NUMBERS = (
         f"{PARTS}/disjoint/16-lanes",
     ),
     Defect(
+        "one stream for every two rays",
+        "{ray, low, high, (bits)0}",
+        "{ray >> 1, low, high, (bits)0}",
+        "identity/delta/transmittance/homogeneous/global",
+    ),
+    Defect(
         "sample numbers that wrap at 2^32",
         "(bits)(uint)(first >> 32) + carry(low, offset)",
         "(bits)(uint)(first >> 32)",
