@@ -107,20 +107,23 @@ class Sweep:
 
     def run(self, scene: Scene, jobs: list[Job], seed: int) -> None:
         """Build and measure the jobs of one scene side by side; each row is written as it ends."""
-        given_up = [job for job in jobs if self.deaths_at(job) >= TWICE]
+        ready = []
         for job in jobs:
-            if job.timed is None or job in given_up:
-                self._finish(job, job.row | (CRASHED if job in given_up else {}))
-        jobs = [job for job in jobs if job.timed is not None and job not in given_up]
+            if self.deaths_at(job) >= TWICE:
+                self._finish(job, job.row | CRASHED)
+            elif job.timed is None:
+                self._finish(job, job.row)
+            else:
+                ready.append(job)
         data: dict[tuple[str, str], KernelData] = {}
-        for place, job in enumerate(jobs, 1):
-            self.on_progress(0.0, f"building {place}/{len(jobs)}")
+        for place, job in enumerate(ready, 1):
+            self.on_progress(0.0, f"building {place}/{len(ready)}")
             self.folder.journal.work_at(key_of(job.row))
             try:
                 self._prepare(job, scene, data)
             except (BuildError, RunError) as error:
                 self._fail(job, error)
-        self._measure([job for job in jobs if job.bench], scene, seed)
+        self._measure([job for job in ready if job.bench], scene, seed)
 
     def _prepare(self, job: Job, scene: Scene, data: dict[tuple[str, str], KernelData]) -> None:
         case, stop = job.case, job.case.stop

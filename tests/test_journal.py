@@ -93,7 +93,7 @@ def test_a_file_that_cannot_be_written_is_told(tmp_path):
 
 
 def test_a_run_gets_past_a_case_that_ends_the_process(work, selector):
-    """Twice is once for each of its scenes: others of the first scene were lost with it."""
+    """Two such cases end it twice each; then they have rows, as all others have."""
     (work / "trackers").mkdir()
     (work / "trackers" / "crashes.cl").write_text(CRASHES)
     (work / "crash.yaml").write_text(CONFIG)

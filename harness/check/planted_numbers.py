@@ -44,6 +44,12 @@ NUMBERS = (
         "identity/delta/transmittance/homogeneous/global",
     ),
     Defect(
+        "one stream for every two samples of a ray",
+        "{ray, low, high, (bits)0}",
+        "{ray, low >> 1, high, (bits)0}",
+        "identity/delta/transmittance/homogeneous/global",
+    ),
+    Defect(
         "sample numbers that wrap at 2^32",
         "(bits)(uint)(first >> 32) + carry(low, offset)",
         "(bits)(uint)(first >> 32)",
