@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from freepath.errors import FreepathError
 
@@ -23,6 +24,7 @@ class Journal:
         self._path = folder / FILE
         self._deaths: dict[str, int] = {}
         self._at_work = ""
+        self._file: Any = None
 
     def open(self) -> None:
         """Count the end of the last process, if it came at work."""
@@ -44,8 +46,9 @@ class Journal:
 
     def work_at(self, key: Sequence[str]) -> None:
         """Call it before anything of a case is built or launched."""
-        if _name(key) != self._at_work:
-            self._at_work = _name(key)
+        name = _name(key)
+        if name != self._at_work:
+            self._at_work = name
             self._write()
 
     def done(self, place: Sequence[str]) -> None:
@@ -58,15 +61,21 @@ class Journal:
     def close(self) -> None:
         """The process ends in order; the file stays while a case is held to have ended one."""
         self._at_work = ""
-        if self._deaths:
-            self._write()
-        else:
+        self._write()
+        self._file.close()
+        self._file = None
+        if not self._deaths:
             self._path.unlink(missing_ok=True)
 
     def _write(self) -> None:
         text = json.dumps({"at_work": self._at_work, "deaths": self._deaths})
         try:
-            self._path.write_text(text, encoding="utf-8")
+            # kept open: between two rounds there is no time for opening and emptying a file
+            self._file = self._file or self._path.open("w", encoding="utf-8")
+            self._file.seek(0)
+            self._file.write(text)
+            self._file.truncate()
+            self._file.flush()
         except OSError as error:
             raise FreepathError(f"{self._path}: cannot be written: {error.strerror}") from error
 
