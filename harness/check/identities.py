@@ -125,18 +125,20 @@ def check_independence(scores: Array, alpha: float) -> None:
     might be all there is; a ray of a few high scores tells nothing, wherever they happen to be.
     """
     deviation = scores - scores.mean(axis=1, keepdims=True)
-    spread = deviation.std(axis=1, keepdims=True)
-    deviation /= np.where(spread > 0.0, spread, np.inf)
+    squares = deviation**2
+    variance = squares.mean(axis=1, keepdims=True)
+    squares /= np.where(variance > 0.0, variance, np.inf)
     # n equal scores among zeros have a kurtosis of count / n
-    kurtosis = (deviation**4).mean(axis=1)
-    deviation = deviation[(kurtosis > 0.0) & (kurtosis < scores.shape[1] / EVENTS)]
+    kurtosis = np.square(squares).mean(axis=1)
+    told = (kurtosis > 0.0) & (kurtosis < scores.shape[1] / EVENTS)
+    deviation = deviation[told] / np.sqrt(variance[told])
     rays, count = deviation.shape
     if rays < 2:
         return
     # as many sums as samples, each normal for many rays: their squares add up to a chi-square
     square = (deviation.sum(axis=0) ** 2).mean() / rays * (count - 1)
     tails = stats.chi2.cdf(square, count - 1), stats.chi2.sf(square, count - 1)
-    serial = (deviation[:, 1:] * deviation[:, :-1]).sum() / np.sqrt(rays * count)
+    serial = np.einsum("rs,rs->", deviation[:, 1:], deviation[:, :-1]) / np.sqrt(rays * count)
     p_values = np.minimum([2.0 * min(tails), 2.0 * stats.norm.sf(abs(serial))], 1.0)
     require(p_values, alpha, "independence (of rays, of samples)")
 

@@ -135,8 +135,8 @@ def several(rig: Rig, alpha: float, tracker: str, shadow: str, chance: float) ->
     medium = {"cloud": CLOUD | {"sigma_t": 10, "albedo": 0.9, "g": 0.4, "emission": 0.5}}
     lamp = {"point_in_environment": {**POINT["point"], "radiance": 0.2}}
     axes = {"light": lamp, "scatterings": 4, "majorant": "grid", "shadow": shadow}
-    one = follow(rig, tracker, medium, p_absorb=chance, **axes).run(4096)
-    other = follow(rig, tracker, medium, **axes).run(4096, first_sample=10000)
+    one = follow(rig, tracker, medium, p_absorb=chance, **axes).run(2048)
+    other = follow(rig, tracker, medium, **axes).run(2048, first_sample=10000)
     check_clean(one, bounded=True)
     _agree(one.moments, other.moments, alpha)
 
