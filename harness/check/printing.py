@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Sequence
 
 from freepath.check.model import Check
@@ -60,11 +60,20 @@ def summary(outcomes: Sequence[Outcome], seconds: float) -> str:
     skipped = [outcome for outcome in outcomes if outcome.status == SKIPPED]
     if skipped:
         lines += ["", "The following tests did not run:"]
-        lines += [f"\t{one.number:>3} - {one.name} (Skipped: {one.text})" for one in skipped]
+        lines += _listed([(one, f"Skipped: {one.text}") for one in skipped])
     if failed:
         lines += ["", "The following tests FAILED:"]
-        lines += [f"\t{one.number:>3} - {one.name} ({one.status})" for one in failed]
+        lines += _listed([(one, one.status) for one in failed])
     return "\n".join(lines)
+
+
+def _listed(outcomes: Sequence[tuple[Outcome, str]]) -> list[str]:
+    """Each once, with what is said of it; of repeats how many."""
+    counts = Counter((one.number, one.name, said) for one, said in outcomes)
+    return [
+        f"\t{number:>3} - {name} ({said})" + (f", {count} times" if count > 1 else "")
+        for (number, name, said), count in counts.items()
+    ]
 
 
 def _times(outcomes: Sequence[Outcome]) -> list[str]:
@@ -84,7 +93,7 @@ def matrix(by_device: dict[str, list[Outcome]]) -> str:
     """Check x device: P passed, F failed (T timed out, C crashed), - not applicable, and why."""
     devices = list(by_device)
     lines = [f"{chr(ord('A') + i)} = {device}" for i, device in enumerate(devices)] + [""]
-    found = {d: {one.name: one for one in outcomes} for d, outcomes in by_device.items()}
+    found = {device: _worst(outcomes) for device, outcomes in by_device.items()}
     names = list(dict.fromkeys(name for outcomes in found.values() for name in outcomes))
     width = max(map(len, ["check", *names]))
     header = " ".join(chr(ord("A") + i) for i in range(len(devices)))
@@ -103,6 +112,11 @@ def matrix(by_device: dict[str, list[Outcome]]) -> str:
         more = f" and {len(where) - 3} more" if len(where) > 3 else ""
         lines.append(f"  {reason}: {', '.join(where[:3])}{more}")
     return "\n".join(lines)
+
+
+def _worst(outcomes: Sequence[Outcome]) -> dict[str, Outcome]:
+    """By name; of repeats the last that failed, if any did."""
+    return {one.name: one for one in sorted(outcomes, key=lambda one: one.wrong)}
 
 
 def _cell(outcome: Outcome | None) -> str:

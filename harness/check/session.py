@@ -5,6 +5,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 from freepath.check import printing
@@ -83,7 +84,7 @@ class Session:
             options.timeout,
             lambda task: self.tell(progress.start(task.number, task.check.name)),
         )
-        for outcome in pool.outcomes(tasks):
+        for outcome in map(partial(_with_seed, setting), pool.outcomes(tasks)):
             ended.append(outcome)
             self.tell(progress.end(outcome))
             self._tell_output(outcome)
@@ -104,6 +105,13 @@ class Session:
         """The names of the checks that failed on any device."""
         wrong = (one.name for ended in self.outcomes.values() for one in ended if one.wrong)
         return list(dict.fromkeys(wrong))
+
+
+def _with_seed(setting: Setting, outcome: Outcome) -> Outcome:
+    """What failed in a repeat says with which seed it fails again."""
+    if not (outcome.wrong and outcome.repeat):
+        return outcome
+    return replace(outcome, text=f"--seed {setting.seed_of(outcome.repeat)}: {outcome.text}")
 
 
 def false_alarms(outcomes: Sequence[Outcome], repeats: int) -> tuple[str, bool]:

@@ -40,6 +40,10 @@ class Setting:
     storage: str = "float"
     """Of voxels, where a check does not say."""
 
+    def seed_of(self, repeat: int) -> int:
+        """Of a repeat, counted from 0."""
+        return self.seed + STRIDE * repeat
+
 
 def serve(connection: Connection, setting: Setting) -> None:
     """Answer each (check's name, repeat) with (status, seconds, text) until there are no more.
@@ -61,7 +65,7 @@ def serve(connection: Connection, setting: Setting) -> None:
         connection.send("")
         while (task := connection.recv()) is not None:
             name, repeat = task
-            seeded = rig.with_seed(setting.seed + STRIDE * repeat)
+            seeded = rig.with_seed(setting.seed_of(repeat))
             # references of rays that are drawn once would fill the user's cache
             with reading_only() if repeat else nullcontext():
                 answer = run(seeded, checks[name])

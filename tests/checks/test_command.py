@@ -138,10 +138,29 @@ def test_repeated_with_fresh_seeds(call, selector):
     assert "the budget is 0.001 a run" in out
 
 
+def test_what_fails_in_a_repeat_fails_again_with_its_seed(call, selector, broken):
+    arguments = ["-d", selector, "--trackers", broken, "-R", "^identity/broken/.*homogeneous"]
+    code, out, _ = call(*arguments, "--repeat", "3", "--seed", "5", "--output-on-failure")
+    assert code == 8
+    said = dict(re.findall(r"    --seed (\d+): (.*)", out))
+    assert list(said) == ["1000008", "2000011"]
+    assert len(set(said.values())) == 2
+    assert len(re.findall(r"^\t.* - identity/broken.*\(Failed\), 3 times$", out, re.M)) == 1
+    _, alone, _ = call(*arguments, "--seed", "1000008", "--output-on-failure")
+    assert said["1000008"] in alone
+
+
 def test_too_many_alarms_are_told():
     outcomes = [Outcome(1, "x", (), "Failed", 0.0, "", repeat) for repeat in range(5)]
     assert session.false_alarms(outcomes, 50)[1]
     assert not session.false_alarms(outcomes[:1], 1000)[1]
+
+
+def test_a_repeat_that_failed_is_in_the_matrix():
+    runs = [
+        Outcome(1, "x", (), status, 0.0, "off", i) for i, status in enumerate(["Failed", "Passed"])
+    ]
+    assert re.search("^x +F$", printing.matrix({"one": runs}), re.M)
 
 
 def test_matrix():
