@@ -19,6 +19,8 @@ class Outcome:
     seconds: float
     text: str = ""
     repeat: int = 0
+    p_value: float | None = None
+    """How likely its tests find something so unlikely by chance; None where it makes none."""
 
     @property
     def wrong(self) -> bool:

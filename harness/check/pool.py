@@ -30,10 +30,14 @@ class Task:
     check: Check
     repeat: int = 0
 
-    def ended(self, status: str, seconds: float, text: str) -> Outcome:
+    def ended(
+        self, status: str, seconds: float, text: str, p_value: float | None = None
+    ) -> Outcome:
         """What became of it."""
-        check = self.check
-        return Outcome(self.number, check.name, check.labels, status, seconds, text, self.repeat)
+        name, labels = self.check.name, self.check.labels
+        return Outcome(
+            self.number, name, labels, status, seconds, text, repeat=self.repeat, p_value=p_value
+        )
 
 
 class Worker:

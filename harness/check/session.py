@@ -9,13 +9,12 @@ from functools import partial
 from pathlib import Path
 
 from freepath.check import printing
-from freepath.check.model import BUDGET, Check
+from freepath.check.model import Check
 from freepath.check.outcome import Outcome
 from freepath.check.pool import Pool, Task
 from freepath.check.worker import Setting
 from freepath.device import NO_DEVICE, DeviceInfo, list_devices, matches
 from freepath.errors import DeviceError
-from scipy import stats
 
 Chosen = Sequence[tuple[int, Check]]
 
@@ -112,22 +111,3 @@ def _with_seed(setting: Setting, outcome: Outcome) -> Outcome:
     if not (outcome.wrong and outcome.repeat):
         return outcome
     return replace(outcome, text=f"--seed {setting.seed_of(outcome.repeat)}: {outcome.text}")
-
-
-def false_alarms(outcomes: Sequence[Outcome], repeats: int) -> tuple[str, bool]:
-    """What repeats with fresh seeds say of false alarms, and whether there are too many.
-
-    Of a right device a run fails with the chance BUDGET at most; too many is what has a chance
-    below 1 in 1000 then.
-    """
-    alarmed = {one.repeat for one in outcomes if one.wrong}
-    test = stats.binomtest(len(alarmed), repeats, BUDGET, alternative="greater")
-    interval = stats.binomtest(len(alarmed), repeats).proportion_ci(0.95, "exact")
-    verdicts = sum(one.wrong for one in outcomes)
-    text = (
-        f"{len(alarmed)} of {repeats} runs with fresh seeds raised an alarm "
-        f"({len(alarmed) / repeats:.2g}, 95 % interval {interval.low:.2g} to {interval.high:.2g}); "
-        f"the budget is {BUDGET:g} a run.\n"
-        f"{verdicts} of {len(outcomes)} verdicts were alarms."
-    )
-    return text, bool(test.pvalue < 1e-3)

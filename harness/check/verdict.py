@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+
+_HEARD: ContextVar[list[float] | None] = ContextVar("p-values", default=None)
 
 
 class Failure(AssertionError):
@@ -27,6 +33,22 @@ def sidak(alpha: float, tests: int) -> float:
     return float(-np.expm1(np.log1p(-alpha) / tests))
 
 
+def chance_of_smallest(p_values: Array) -> float:
+    """How likely the smallest of several p-values is so small by chance: what `sidak` inverts."""
+    return float(1.0 - (1.0 - np.min(p_values)) ** len(p_values))
+
+
+@contextmanager
+def hearing() -> Iterator[list[float]]:
+    """The list of what every `require` inside finds, passed or not: the chance of its smallest."""
+    heard: list[float] = []
+    before = _HEARD.set(heard)
+    try:
+        yield heard
+    finally:
+        _HEARD.reset(before)
+
+
 def require(
     p_values: Array,
     alpha: float,
@@ -40,6 +62,9 @@ def require(
     """
     p_values = np.atleast_1d(p_values)
     level, worst = sidak(alpha, len(p_values)), int(np.argmin(p_values))
+    heard = _HEARD.get()
+    if heard is not None:
+        heard.append(chance_of_smallest(p_values))
     if p_values[worst] >= level:
         return
     # also where it is no number

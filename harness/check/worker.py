@@ -12,12 +12,13 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
 
+import numpy as np
 from freepath import catalog
 from freepath.check import registry
 from freepath.check.model import LEVEL, Check
 from freepath.check.outcome import FAILED, PASSED, SKIPPED
 from freepath.check.rig import SEED, Rig
-from freepath.check.verdict import Failure, NotApplicable
+from freepath.check.verdict import Failure, NotApplicable, chance_of_smallest, hearing
 from freepath.device import open_devices
 from freepath.drivers import INTERPRETER_LOG
 from freepath.errors import DriverLimitError, FreepathError
@@ -46,7 +47,7 @@ class Setting:
 
 
 def serve(connection: Connection, setting: Setting) -> None:
-    """Answer each (check's name, repeat) with (status, seconds, text) until there are no more.
+    """Answer each (check's name, repeat) with what `run` returns until there are no more.
 
     The first message is '' or why the device cannot be used.
     """
@@ -72,11 +73,16 @@ def serve(connection: Connection, setting: Setting) -> None:
             connection.send(answer)
 
 
-def run(rig: Rig, check: Check) -> tuple[str, float, str]:
-    """Run a check; returns its status, how many seconds it took, and what it has to say."""
+def run(rig: Rig, check: Check) -> tuple[str, float, str, float | None]:
+    """Run a check; returns its status, how many seconds it took, what it has to say, its p-value.
+
+    The p-value is the chance of the smallest that its tests found, as of an `Outcome`.
+    """
     started = time.perf_counter()
-    status, text = _verdict(rig, check)
-    return status, time.perf_counter() - started, text
+    with hearing() as heard:
+        status, text = _verdict(rig, check)
+    p_value = chance_of_smallest(np.array(heard)) if heard else None
+    return status, time.perf_counter() - started, text, p_value
 
 
 def _verdict(rig: Rig, check: Check) -> tuple[str, str]:

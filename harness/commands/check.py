@@ -290,11 +290,11 @@ def _run_on(running: Session, info: Any) -> list[str]:
 
 
 def _judge_repeats(by_device: dict[str, list[Outcome]], repeats: int) -> int:
-    from freepath.check import session
+    from freepath.check.repeats import false_alarms, small_p_values
 
     too_many = False
     for device, outcomes in by_device.items():
-        text, wrong = session.false_alarms(outcomes, repeats)
-        print(f"\n{device}: {text}")
+        text, wrong = false_alarms(outcomes, repeats)
+        print(f"\n{device}: {text}\n{small_p_values(outcomes)}")
         too_many |= wrong
     return FAILED if too_many else 0

@@ -79,7 +79,7 @@ def test_an_interpreter_has_its_say(work, capfd):
 
 
 def test_outcomes_are_handed_on(tmp_path):
-    outcomes = {"a": [Outcome(1, "x", ("fast",), "Failed", 0.5, "why", 2)]}
+    outcomes = {"a": [Outcome(1, "x", ("fast",), "Failed", 0.5, "why", 2, p_value=1e-9)]}
     everywhere.write(tmp_path / "file", outcomes, ["b: gone"])
     assert everywhere.read(tmp_path / "file") == (outcomes, ["b: gone"])
 

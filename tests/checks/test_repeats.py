@@ -1,15 +1,28 @@
 """Repeats of a check share what no seed changes, and nothing else."""
 
 import dataclasses
+import re
 
 import numpy as np
 import pytest
+from freepath.check import worker
 from freepath.check.media import MEDIA
+from freepath.check.model import Check
+from freepath.check.outcome import Outcome
 from freepath.check.parts import Lanes
+from freepath.check.repeats import false_alarms, small_p_values
 from freepath.check.rig import MOST_SCENES
 from freepath.check.truth import cut, depth_at
-from freepath.check.verdict import NotApplicable
+from freepath.check.verdict import (
+    Failure,
+    NotApplicable,
+    chance_of_smallest,
+    hearing,
+    require,
+    sidak,
+)
 from freepath.scene import cache
+from scipy import stats
 
 FIXED = {"orthographic": {"resolution": 4}}
 
@@ -105,3 +118,68 @@ def test_nothing_is_written_while_the_cache_is_only_read(tmp_path, monkeypatch):
     cache.cached("one", lambda: np.arange(4))
     with cache.reading_only():
         assert cache.cached("one", lambda: np.arange(3)).tolist() == [0, 1, 2, 3]
+
+
+def ended(name, p_values, status="Passed"):
+    return [
+        Outcome(1, name, (), status, 0.0, repeat=repeat, p_value=p_value)
+        for repeat, p_value in enumerate(p_values)
+    ]
+
+
+def test_too_many_alarms_are_told():
+    outcomes = ended("x", [None] * 5, "Failed")
+    assert false_alarms(outcomes, 50)[1]
+    assert not false_alarms(outcomes[:1], 1000)[1]
+
+
+def test_the_chance_of_the_smallest():
+    p_values = np.random.default_rng(1).random((100_000, 8))
+    found = np.array([chance_of_smallest(one) for one in p_values])
+    assert stats.kstest(found, "uniform").pvalue > 1e-3
+    assert chance_of_smallest(np.full(8, sidak(1e-7, 8))) == pytest.approx(1e-7, rel=1e-6)
+
+
+def test_every_test_of_a_check_is_heard(rig):
+    def run(rig, alpha):
+        require(np.array([0.5, 0.02]), alpha, "one")
+        require(np.array([0.3]), alpha, "other")
+
+    status, _, _, p_value = worker.run(rig, Check("x", (), "", run))
+    assert status == "Passed"
+    assert p_value == pytest.approx(1 - (0.98**2) ** 2)
+
+
+def test_what_fails_is_heard_and_what_tests_nothing_is_not(rig):
+    failing = Check("x", (), "", lambda rig, alpha: require(np.array([1e-9]), alpha, "mean"))
+    status, _, text, p_value = worker.run(rig, failing)
+    assert (status, p_value) == ("Failed", pytest.approx(1e-9))
+    assert "p = 1e-09" in text
+    assert worker.run(rig, Check("y", (), "", lambda rig, alpha: None))[3] is None
+
+
+def test_nothing_is_heard_outside():
+    with hearing() as heard:
+        require(np.array([0.5]), 0.01, "inside")
+    with pytest.raises(Failure):
+        require(np.array([0.001]), 0.01, "outside")
+    assert heard == [0.5]
+
+
+def test_p_values_as_chance_gives_them_name_no_check():
+    rng = np.random.default_rng(2)
+    outcomes = [one for i in range(300) for one in ended(f"check-{i}", rng.random(200))]
+    text = small_p_values(outcomes)
+    assert text.startswith("p-values of 60000 verdicts: ")
+    assert "below 0.01 (expected 600)" in text
+    assert "too small" not in text
+
+
+def test_a_check_whose_p_values_are_too_small_is_named_long_before_it_fails():
+    rng = np.random.default_rng(3)
+    outcomes = [one for i in range(300) for one in ended(f"check-{i}", rng.random(200))]
+    # a normal test of a variable with the tails of Student's t of two degrees of freedom
+    heavy = 2 * stats.norm.sf(np.abs(stats.t.rvs(2, size=200, random_state=rng)))
+    text = small_p_values([*outcomes, *ended("heavy", heavy)])
+    (line,) = text.splitlines()[1:]
+    assert re.fullmatch(r"  too small too often: heavy: \d+ of 200 below 0.01, .*", line)
