@@ -29,7 +29,7 @@ Axes = dict[str, Any]
 MANY = 100  # rays over which a sum is close enough to a normal distribution
 DISTRIBUTED = 128  # samples of each ray of which the depth is looked up: that is dear in a grid
 VARIES = 100.0  # roundings that a sample may be off
-MORE = 8  # times as many samples
+MORE = (8, 32)  # times as many samples
 COARSE = 0.05  # what a tracker that says it is biased may be off with its default parameters
 
 
@@ -83,10 +83,17 @@ def ends_where_it_scores(samples: Samples) -> bool:
 
 
 def _resolved(flight: Flight, samples: Samples) -> Samples:
-    """More of them, where a few rare high weights leave the mean all but unknown."""
-    if not noise_of(samples.round.moments, flight.reference()) > RESOLVED / 2:
-        return samples
-    return flight.record(samples.score.shape[1], blocks=MORE)
+    """More of them, where a few rare high weights leave the mean all but unknown.
+
+    And more again: one weight in a million may come among those, and be most of the noise.
+    """
+    expected, count = flight.reference(), samples.score.shape[1]
+    for times in MORE:
+        # a noise that is no number is for the tests to find
+        if not noise_of(samples.round.moments, expected) > RESOLVED / 2:
+            break
+        samples = flight.record(count, blocks=times)
+    return samples
 
 
 def _by_rounding(flight: Flight, samples: Samples, alpha: float) -> int:
