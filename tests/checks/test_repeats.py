@@ -24,6 +24,9 @@ from freepath.check.verdict import (
 from freepath.scene import cache
 from scipy import stats
 
+from checks.support import CHECKS
+
+BY_NAME = {check.name: check for check in CHECKS}
 FIXED = {"orthographic": {"resolution": 4}}
 
 
@@ -164,6 +167,12 @@ def test_nothing_is_heard_outside():
     with pytest.raises(Failure):
         require(np.array([0.001]), 0.01, "outside")
     assert heard == [0.5]
+
+
+def test_a_test_that_is_to_reject_is_not_heard(rig):
+    status, _, _, p_value = worker.run(rig, BY_NAME["hard/non-bounding/clamped-bias/delta"])
+    assert status == "Passed"
+    assert p_value > 1e-6
 
 
 def test_p_values_as_chance_gives_them_name_no_check():

@@ -113,8 +113,7 @@ def variance(rig: Rig, alpha: float, tracker: str, chance: float | str) -> None:
     # at 0.9 fourth powers of weights grow too fast for a test of a variance
     albedo, depth = 0.8, 1.0
     survival = albedo if chance == "analog" else 1.0 - chance
-    # above 1 the root is imaginary: a rod that multiplies light, but not beyond any bound
-    second = sum(rod_model(albedo**2 / survival + 0j, depth)).real
+    second = sum(rod_model(albedo**2 / survival, depth))
     axes = {"estimand": "radiance", "rays": FEW, "lanes": 16, "p_absorb": chance}
     medium = homogeneous(depth, albedo=albedo, phase="rod")
     scores = rig.flight(tracker=tracker, medium=medium, **axes).record(8192).score
