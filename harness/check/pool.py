@@ -5,12 +5,14 @@ from __future__ import annotations
 import itertools
 import multiprocessing
 import signal
+import tempfile
 import time
 from collections import deque
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
+from pathlib import Path
 from typing import Any
 
 from freepath.check.model import Check
@@ -41,12 +43,15 @@ class Task:
 
 
 class Worker:
-    """A process and what it is at."""
+    """A process, what it is at, and the folder for what its checks write."""
 
     def __init__(self, setting: Setting):
         context = multiprocessing.get_context("spawn")
         self.connection, other = context.Pipe()
-        self.process = context.Process(target=_serve, args=(other, setting), daemon=True)
+        # not the process's own: it is killed in the end, and would leave it behind
+        self.folder = tempfile.TemporaryDirectory(prefix="freepath-check-")
+        given = (other, setting, Path(self.folder.name))
+        self.process = context.Process(target=_serve, args=given, daemon=True)
         self.process.start()
         other.close()
         self.ready = False
@@ -70,6 +75,7 @@ class Worker:
         self.connection.close()
         self.process.kill()
         self.process.join()
+        self.folder.cleanup()
 
     def crash(self) -> str:
         """Why it died."""
@@ -82,11 +88,11 @@ class Worker:
         return f"its process was ended by signal {-code}"
 
 
-def _serve(connection: Connection, setting: Setting) -> None:
+def _serve(connection: Connection, setting: Setting, folder: Path) -> None:
     # Ctrl-C reaches the whole group; the parent ends its workers itself
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     with suppress(EOFError, BrokenPipeError):
-        serve(connection, setting)
+        serve(connection, setting, folder)
 
 
 @dataclass

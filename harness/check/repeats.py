@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from freepath.check.model import BUDGET
@@ -17,6 +17,31 @@ SUSPECT = 1e-3
 """The chance that a check is named although its p-values are what chance gives, of all together."""
 
 
+def of_devices(
+    by_device: Mapping[str, Sequence[Outcome]], repeats: int, *, stopped: bool = False
+) -> tuple[str, bool]:
+    """What repeats say of each device, and whether one had too many false alarms.
+
+    All repeats of one kernel come first, so none is whole where they were stopped: their p-values
+    are told then, but no rate.
+    """
+    told, wrong = [], False
+    for device, outcomes in by_device.items():
+        if stopped:
+            text = "stopped, so no run is whole and the rate of false alarms is unknown.\n"
+            text, too_many = text + alarms(outcomes), False
+        else:
+            text, too_many = false_alarms(outcomes, repeats)
+        told.append(f"{device}: {text}\n{small_p_values(outcomes)}")
+        wrong |= too_many
+    return "\n\n".join(told), wrong
+
+
+def alarms(outcomes: Sequence[Outcome]) -> str:
+    """How many verdicts were alarms."""
+    return f"{sum(one.wrong for one in outcomes)} of {len(outcomes)} verdicts were alarms."
+
+
 def false_alarms(outcomes: Sequence[Outcome], repeats: int) -> tuple[str, bool]:
     """What repeats with fresh seeds say of false alarms, and whether there are too many.
 
@@ -26,12 +51,11 @@ def false_alarms(outcomes: Sequence[Outcome], repeats: int) -> tuple[str, bool]:
     alarmed = {one.repeat for one in outcomes if one.wrong}
     test = stats.binomtest(len(alarmed), repeats, BUDGET, alternative="greater")
     interval = stats.binomtest(len(alarmed), repeats).proportion_ci(0.95, "exact")
-    verdicts = sum(one.wrong for one in outcomes)
     text = (
         f"{len(alarmed)} of {repeats} runs with fresh seeds raised an alarm "
         f"({len(alarmed) / repeats:.2g}, 95 % interval {interval.low:.2g} to {interval.high:.2g}); "
         f"the budget is {BUDGET:g} a run.\n"
-        f"{verdicts} of {len(outcomes)} verdicts were alarms."
+        f"{alarms(outcomes)}"
     )
     return text, bool(test.pvalue < 1e-3)
 

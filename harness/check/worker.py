@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import tempfile
 import time
 import traceback
 from collections.abc import Sequence
@@ -46,31 +45,30 @@ class Setting:
         return self.seed + STRIDE * repeat
 
 
-def serve(connection: Connection, setting: Setting) -> None:
+def serve(connection: Connection, setting: Setting, folder: Path) -> None:
     """Answer each (check's name, repeat) with what `run` returns until there are no more.
 
-    The first message is '' or why the device cannot be used.
+    The first message is '' or why the device cannot be used. The folder is for what checks write.
     """
-    with tempfile.TemporaryDirectory(prefix="freepath-check-") as folder:
-        # every process of an interpreter begins its log anew
-        os.environ[INTERPRETER_LOG] = str(Path(folder) / "log")
-        try:
-            known = catalog.load(setting.trackers)
-            device = open_devices([setting.device] if setting.device else [])[0]
-            rig = Rig(device, known, Path(folder), setting.seed)
-            rig = rig.with_arithmetic(setting.arithmetic).with_storage(setting.storage)
-        except FreepathError as error:
-            connection.send(str(error))
-            return
-        checks = {check.name: check for check in registry.checks(known)}
-        connection.send("")
-        while (task := connection.recv()) is not None:
-            name, repeat = task
-            seeded = rig.with_seed(setting.seed_of(repeat))
-            # references of rays that are drawn once would fill the user's cache
-            with reading_only() if repeat else nullcontext():
-                answer = run(seeded, checks[name])
-            connection.send(answer)
+    # every process of an interpreter begins its log anew
+    os.environ[INTERPRETER_LOG] = str(folder / "log")
+    try:
+        known = catalog.load(setting.trackers)
+        device = open_devices([setting.device] if setting.device else [])[0]
+        rig = Rig(device, known, folder, setting.seed)
+        rig = rig.with_arithmetic(setting.arithmetic).with_storage(setting.storage)
+    except FreepathError as error:
+        connection.send(str(error))
+        return
+    checks = {check.name: check for check in registry.checks(known)}
+    connection.send("")
+    while (task := connection.recv()) is not None:
+        name, repeat = task
+        seeded = rig.with_seed(setting.seed_of(repeat))
+        # references of rays that are drawn once would fill the user's cache
+        with reading_only() if repeat else nullcontext():
+            answer = run(seeded, checks[name])
+        connection.send(answer)
 
 
 def run(rig: Rig, check: Check) -> tuple[str, float, str, float | None]:

@@ -15,7 +15,6 @@ from freepath.errors import FAILED, INTERRUPTED, DeviceError, NothingMatchedErro
 
 if TYPE_CHECKING:
     from freepath.check.model import Check
-    from freepath.check.outcome import Outcome
     from freepath.check.session import Session
     from freepath.selection import Parts
 
@@ -180,7 +179,7 @@ def _handed_on(options: Namespace) -> list[str]:
 
 def _run(options: Namespace, chosen: list[tuple[int, Check]]) -> int:
     from freepath import selection
-    from freepath.check import everywhere, files, session
+    from freepath.check import everywhere, files, repeats, session
 
     parts = selection.processes_of(options.device)
     infos = [] if parts else session.devices_of(options.device)
@@ -208,6 +207,11 @@ def _run(options: Namespace, chosen: list[tuple[int, Check]]) -> int:
             unusable += _run_in_processes(options, parts, running)
         for info in infos:
             unusable += _run_on(running, info)
+    except KeyboardInterrupt:
+        if options.repeat > 1 and not options.outcomes:
+            text, _ = repeats.of_devices(running.outcomes, options.repeat, stopped=True)
+            print(f"\n{text}", flush=True)
+        raise
     finally:
         # also after Ctrl-C: what is known is kept
         if options.outcomes:
@@ -220,7 +224,7 @@ def _run(options: Namespace, chosen: list[tuple[int, Check]]) -> int:
 
 def _judge(options: Namespace, running: Session, unusable: list[str]) -> int:
     """Print what is to be said of all devices together; returns the exit code."""
-    from freepath.check import printing
+    from freepath.check import printing, repeats
 
     failed = FAILED if running.failed or unusable else 0
     if options.outcomes:
@@ -230,7 +234,10 @@ def _judge(options: Namespace, running: Session, unusable: list[str]) -> int:
     for message in unusable:
         print(f"freepath: {message}", file=sys.stderr)
     if options.repeat > 1:
-        return _judge_repeats(running.outcomes, options.repeat)
+        stopped = bool(options.stop_on_failure and failed)
+        text, too_many = repeats.of_devices(running.outcomes, options.repeat, stopped=stopped)
+        print(f"\n{text}")
+        return FAILED if too_many or stopped else 0
     if running.failed:
         print("Errors while running freepath check", file=sys.stderr)
         if not options.output_on_failure:
@@ -287,14 +294,3 @@ def _run_on(running: Session, info: Any) -> list[str]:
         if ended:
             print(printing.summary(ended, time.perf_counter() - started), flush=True)
     return []
-
-
-def _judge_repeats(by_device: dict[str, list[Outcome]], repeats: int) -> int:
-    from freepath.check.repeats import false_alarms, small_p_values
-
-    too_many = False
-    for device, outcomes in by_device.items():
-        text, wrong = false_alarms(outcomes, repeats)
-        print(f"\n{device}: {text}\n{small_p_values(outcomes)}")
-        too_many |= wrong
-    return FAILED if too_many else 0

@@ -5,6 +5,7 @@ import re
 import shutil
 import signal
 import subprocess
+import sys
 import time
 from xml.etree import ElementTree
 
@@ -151,6 +152,37 @@ def test_what_fails_in_a_repeat_fails_again_with_its_seed(call, selector, broken
     assert said["1000008"] in alone
 
 
+def test_repeats_that_are_interrupted_tell_what_they_know(tmp_path, selector):
+    command = ["check", "-d", selector, "-R", "^inversion/analytic/", "--repeat", "100000"]
+    running = subprocess.Popen(
+        [sys.executable, "-m", "freepath", *command],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        cwd=tmp_path,
+    )
+    try:
+        while "Passed" not in running.stdout.readline():
+            pass
+        running.send_signal(signal.SIGINT)
+        out, err = running.communicate(timeout=60)
+    finally:
+        running.kill()
+    assert running.returncode == 130
+    assert err == "freepath: interrupted\n"
+    assert "stopped, so no run is whole and the rate of false alarms is unknown.\n" in out
+    assert re.search(r"^0 of \d+ verdicts were alarms\.$", out, re.M)
+    assert "of 100000 runs" not in out
+
+
+def test_repeats_that_stop_at_a_failure_tell_no_rate(call, selector, broken):
+    arguments = ["-d", selector, "--trackers", broken, "-R", "^identity/broken/.*homogeneous"]
+    code, out, _ = call(*arguments, "--repeat", "50", "--stop-on-failure")
+    assert code == 8
+    assert "stopped, so no run is whole and the rate of false alarms is unknown.\n" in out
+    assert "of 50 runs" not in out
+
+
 def test_a_repeat_that_failed_is_in_the_matrix():
     runs = [
         Outcome(1, "x", (), status, 0.0, "off", i) for i, status in enumerate(["Failed", "Passed"])
@@ -194,9 +226,10 @@ def hang(*_):
 
 
 @pytest.mark.parametrize(("doing", "status"), [(crash, "Crashed"), (hang, "Timeout")])
-def test_a_check_that_takes_its_process_with_it(monkeypatch, selector, doing, status):
-    """The others are run all the same, by another process."""
+def test_a_check_that_takes_its_process_with_it(monkeypatch, selector, tmp_path, doing, status):
+    """The others are run all the same, by another process, and nothing is left behind."""
     monkeypatch.setattr("freepath.check.pool._serve", serve_badly)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     tasks = [
         Task(i, Check(name, (), "", doing), 0) for i, name in enumerate([doing.__name__, "ok"])
     ]
@@ -206,9 +239,11 @@ def test_a_check_that_takes_its_process_with_it(monkeypatch, selector, doing, st
     assert outcomes["ok"].status == "Passed"
     if status == "Crashed":
         assert "SIGSEGV" in outcomes["crash"].text
+    assert not list(tmp_path.iterdir())
 
 
-def serve_badly(connection, setting):
+def serve_badly(connection, setting, folder):
+    (folder / "case.yaml").touch()
     connection.send("")
     while (task := connection.recv()) is not None:
         {"crash": crash, "hang": hang}.get(task[0], lambda: None)()

@@ -10,7 +10,7 @@ from freepath.check.media import MEDIA
 from freepath.check.model import Check
 from freepath.check.outcome import Outcome
 from freepath.check.parts import Lanes
-from freepath.check.repeats import false_alarms, small_p_values
+from freepath.check.repeats import false_alarms, of_devices, small_p_values
 from freepath.check.rig import MOST_SCENES
 from freepath.check.truth import cut, depth_at
 from freepath.check.verdict import (
@@ -134,6 +134,22 @@ def test_too_many_alarms_are_told():
     outcomes = ended("x", [None] * 5, "Failed")
     assert false_alarms(outcomes, 50)[1]
     assert not false_alarms(outcomes[:1], 1000)[1]
+
+
+def test_stopped_repeats_tell_no_rate_but_their_p_values():
+    outcomes = ended("x", [0.5, 0.005, 0.3, 0.2]) + ended("y", [0.1], "Failed")
+    whole, wrong = of_devices({"device": outcomes}, 50)
+    assert whole.startswith("device: 1 of 50 runs with fresh seeds raised an alarm")
+    assert not wrong
+    stopped, wrong = of_devices({"device": outcomes}, 50, stopped=True)
+    assert not wrong
+    assert "of 50 runs" not in stopped
+    assert stopped.splitlines() == [
+        "device: stopped, so no run is whole and the rate of false alarms is unknown.",
+        "1 of 5 verdicts were alarms.",
+        "p-values of 5 verdicts: 1 below 0.01 (expected 0.05), 0 below 0.001 (expected 0.005), "
+        "0 below 0.0001 (expected 0.0005).",
+    ]
 
 
 def test_the_chance_of_the_smallest():
