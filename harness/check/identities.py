@@ -22,15 +22,18 @@ GROUPS = 8  # of rays with like expectations: errors of thin and of thick rays m
 
 
 def _require_groups(
-    measured: Array, expected: Array, square_error: Array, order_by: Array, test: tuple[float, str]
+    measured: Array, expected: Array, square_error: Array, event: float, test: tuple[float, str]
 ) -> None:
     """Two-sided z-tests of sums over groups of rays with independent errors.
 
     Each group has the same share of all noise: a group of rays on which hardly anything happens
-    would have no normal distribution, nor a sample of its variance.
+    would have no normal distribution, nor a sample of its variance. Rare events that did not come
+    in a ray are not in its `square_error` either. If they are all that a sum is off by, they are
+    as many as that over `event`, what one adds to it, and their variance is the product: the score
+    test of a Poisson rate, where a Wald test has far too many small p-values.
     """
     alpha, what = test
-    order = np.argsort(order_by, kind="stable")
+    order = np.argsort(expected, kind="stable")
     share = np.cumsum(square_error[order])
     if share[-1] == 0.0:
         demand((measured == expected).all(), f"{what}: without variance, and not as expected")
@@ -43,7 +46,8 @@ def _require_groups(
     there = square > 0.0
     # a sum of differences, as that of two sums would lose its digits where all is nearly 1
     difference = np.bincount(group, (measured - expected)[order], GROUPS)
-    p_values = 2.0 * stats.norm.sf(np.abs(difference[there]) / np.sqrt(square[there]))
+    off = np.abs(difference[there])
+    p_values = 2.0 * stats.norm.sf(off / np.sqrt(square[there] + event * off))
     require(p_values, alpha, what, found[there] / rays[there], wanted[there] / rays[there])
 
 
@@ -73,21 +77,36 @@ def noise_of(moments: Moments, expected: Array) -> float:
     return float(np.sqrt((moments.variance / moments.count).sum()) / expected.sum())
 
 
-def check_mean(moments: Moments, expected: Array, alpha: float) -> None:
+def check_mean(moments: Moments, expected: Array, alpha: float, event: float = 0.0) -> None:
     """z-tests of the mean of each group of rays.
 
     They must be able to tell something: weights that explode would hide behind their own variance.
+    `event` is how much a rare one adds to a score, where that is known: see `largest_event`.
     """
     square_error = moments.variance / moments.count
     noise = noise_of(moments, expected)
     demand(noise < RESOLVED, f"mean: known to {noise:.2g} only")
-    _require_groups(moments.mean, expected, square_error, expected, (alpha, "mean"))
+    event /= moments.count
+    _require_groups(moments.mean, expected, square_error, event, (alpha, "mean"))
+
+
+def largest_event(scores: Array) -> float:
+    """How large the deviations (rays, samples) are that make a ray vary; the largest of all rays.
+
+    Each weighs what it adds to the variance. So of a ray on which something happens now and then
+    it is the size of that, however rare.
+    """
+    deviation = np.abs(scores - scores.mean(axis=1, keepdims=True))
+    square = np.einsum("rs,rs->r", deviation, deviation)
+    cube = np.einsum("rs,rs,rs->r", deviation, deviation, deviation)
+    return float((cube / np.where(square > 0.0, square, np.inf)).max())
 
 
 def check_count(counts: Array, expected: Array, alpha: float) -> None:
     """z-tests of the mean of whole numbers (rays, samples), such as lookups."""
-    square_error = counts.var(axis=1, ddof=1) / counts.shape[1]
-    _require_groups(counts.mean(axis=1), expected, square_error, expected, (alpha, "count"))
+    samples = counts.shape[1]
+    square_error, event = counts.var(axis=1, ddof=1) / samples, largest_event(counts) / samples
+    _require_groups(counts.mean(axis=1), expected, square_error, event, (alpha, "count"))
 
 
 def check_variance(scores: Array, expected: Array, alpha: float) -> None:
@@ -102,7 +121,8 @@ def check_variance(scores: Array, expected: Array, alpha: float) -> None:
     square = squares.sum(axis=1) / (count - 1)
     fourth = (squares**2).mean(axis=1)
     error = np.maximum(fourth - square**2 * (count - 3) / (count - 1), 0.0) / count
-    _require_groups(square, expected, error, expected, (alpha, "variance"))
+    event = largest_event(squares) / count
+    _require_groups(square, expected, error, event, (alpha, "variance"))
 
 
 def check_empty(moments: Moments, depth: Array, rounding: float) -> None:

@@ -9,6 +9,8 @@ from freepath.check.identities import (
     check_clean,
     check_empty,
     check_independence,
+    check_mean,
+    largest_event,
     violations_by_rounding,
 )
 from freepath.check.verdict import Failure
@@ -98,6 +100,48 @@ def test_independence_is_rejected_as_often_as_it_says():
         except Failure:
             rejected += 1
     assert 6 <= rejected <= 40  # 20 expected; beyond has a chance of 1 in 10,000
+
+
+def grazing(seed):
+    """Rays that hardly vary, and a few like them that score 0 now and then, grazing a corner."""
+    random = np.random.default_rng(seed)
+    expected = random.uniform(0.998, 1.0, RAYS)
+    found = expected[:, None] + 1e-3 * random.normal(size=(RAYS, COUNT))
+    expected[:4] = 1.0 - 2.0 / COUNT
+    found[:4] = random.random((4, COUNT)) >= 2.0 / COUNT
+    return found, expected
+
+
+def rejected_means(drawn, alpha, event=largest_event, bias=0.0):
+    count = 0
+    for found, expected in drawn:
+        mean = found.mean(axis=1) + bias
+        m2 = ((found - mean[:, None]) ** 2).sum(axis=1)
+        try:
+            check_mean(Moments(found.shape[1], mean, m2), expected, alpha, event(found))
+        except Failure:
+            count += 1
+    return count
+
+
+def drawn_scores(times):
+    chance = np.geomspace(1e-3, 0.9, RAYS)
+    return ((scores(seed), chance) for seed in range(times))
+
+
+def test_a_rare_score_that_did_not_come_between_quiet_rays_is_no_bias():
+    drawn = [grazing(seed) for seed in range(200)]
+    assert rejected_means(drawn, 1e-3) <= 2
+    assert rejected_means(drawn, 1e-3, lambda found: 0.0) > 20  # not knowing how large one is
+
+
+def test_means_are_rejected_at_most_as_often_as_it_says():
+    assert 1 <= rejected_means(drawn_scores(200), 0.05) <= 25  # 10 expected; 1 in 10,000 beyond
+
+
+def test_a_bias_of_all_rays_is_found():
+    # of the sum of a group's rays, 12 standard errors and more
+    assert rejected_means(drawn_scores(20), ALPHA, bias=0.02) == 20
 
 
 @pytest.mark.parametrize("shared", [0.3, 1.0])
