@@ -8,6 +8,7 @@ BIN := $(VENV)/bin
 .PHONY: sweep test devices lint schema clean
 
 sweep: $(VENV)/installed
+	$(BIN)/python -m freepath.device_setup --if-needed
 	$(BIN)/freepath run quick
 
 test: $(VENV)/installed-for-tests

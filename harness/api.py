@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from freepath.errors import RunError
 from freepath.results import SUMMARY, ResultFolder, read_rows, records
 
 
@@ -25,16 +26,27 @@ def run(
     done; True prints a line a case. Returns what `load` does. Raises FreepathError with the message
     that the command line prints, and KeyboardInterrupt with what was measured left in the folder.
     """
-    from freepath import catalog, plan, session
+    from freepath import catalog, drivers, plan, selection, session
     from freepath import config as configs
-    from freepath.device import open_devices
 
     clock = session.Clock(time.perf_counter())
     known = catalog.load([])
     loaded = configs.load(configs.find(str(config)), known.parameter_models(), list(axes))
     cases = plan.select(plan.expand(loaded, known), None, None)
-    opened = open_devices(list(devices))
+    parts = selection.checked(selection.resolve(list(devices)))
     folder = ResultFolder(Path(output) if output else session.new_folder(loaded.name))
+    if not selection.can_be_here(parts):
+        for part in parts:
+            chosen = [word for info in part.infos for word in ("-d", selection.selector_of(info))]
+            chosen += [word for axis in axes for word in ("-a", axis)]
+            command = ["run", str(loaded.path), "-o", str(folder.folder), "--rows-only", *chosen]
+            command += ["--resume"] * folder.holds_rows
+            ended = drivers.in_process_of(part.driver, command, capture=progress is not True)
+            if part.failure or ended.returncode:
+                why = part.failure or drivers.how_it_ended(part.driver, ended.returncode)
+                raise RunError(f"{why}\n{ended.stderr or ''}".strip())
+        return load(folder.folder)
+    opened = selection.opened(parts)
     on_done = _say if progress is True else _ignore
     on_progress = progress if callable(progress) else _ignore
     session.Run(loaded, known, cases, folder, clock, on_done, on_progress).execute(opened)

@@ -36,7 +36,7 @@ def add_device(command: Any, what: str) -> None:
         action="append",
         default=[],
         metavar="DEVICE",
-        help=f"{what} (default: the first; see `freepath devices`)",
+        help=f"{what} (default: $FREEPATH_DEVICE, or the first that works: `freepath devices`)",
     )
 
 

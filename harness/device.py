@@ -8,9 +8,11 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
-from freepath import drivers
+from freepath import cpu_name, drivers
+from freepath.compilers import compilers_into, told_first
 from freepath.errors import BuildError, DeviceError, RunError
 from freepath.source import SCALARS, Source
 
@@ -30,7 +32,6 @@ LLVMPIPE_LOOPS = 65535
 """Mesa 22.3 silently ends all loops of a work-item after so many rounds of them together."""
 LLVMPIPE_GROUP = 8
 """llvmpipe follows so many work-items of a group in step; smaller groups leave it idle."""
-NO_DEVICE = "no OpenCL device found; `pip install 'freepath[pocl]'` brings one that runs on the CPU"
 
 
 @dataclass(frozen=True)
@@ -90,7 +91,7 @@ def _info(device: cl.Device, number: int = 1) -> DeviceInfo:
     )
 
 
-def _all_devices() -> list[tuple[cl.Device, DeviceInfo]]:
+def all_devices() -> list[tuple[cl.Device, DeviceInfo]]:
     """Every device of every platform; a platform may have none and then says so by an error."""
     try:
         platforms = cl.get_platforms()
@@ -116,26 +117,21 @@ def _all_devices() -> list[tuple[cl.Device, DeviceInfo]]:
 
 def list_devices() -> list[DeviceInfo]:
     """All OpenCL devices of all platforms; empty where there is none."""
-    return [info for _, info in _all_devices()]
+    return [info for _, info in all_devices()]
 
 
 def open_devices(selectors: list[str]) -> list[Device]:
-    """Open the devices whose name, platform or driver contains a selector; without one, the first.
+    """Open the devices of this process whose name, platform or driver has a selector in it.
 
-    Raises DeviceError where there is no device, a selector matches none, or one cannot be opened.
+    Without a selector the first. Raises DeviceError where none matches, or one cannot be opened.
     """
-    devices = _all_devices()
-    if not devices:
-        raise DeviceError(NO_DEVICE)
-    if not selectors:
-        return [Device(*devices[0])]
+    devices = all_devices()
     chosen: dict[int, Device] = {}
-    for selector in selectors:
+    for selector in selectors or ["all"]:
         matching = [i for i, (_, info) in enumerate(devices) if matches(info, selector)]
         if not matching:
-            names = "\n".join(f"  {info.label}" for _, info in devices)
-            raise DeviceError(f"no OpenCL device matches '{selector}'; there are\n{names}")
-        chosen |= {i: Device(*devices[i]) for i in matching if i not in chosen}
+            raise DeviceError(f"no OpenCL device of this process matches '{selector}'")
+        chosen |= {i: Device(*devices[i]) for i in matching[: None if selectors else 1]}
     return list(chosen.values())
 
 
@@ -161,7 +157,10 @@ class Device:
     def __init__(self, device: cl.Device, info: DeviceInfo):
         self.info = info
         self._device = device
+        self.compiler_log: Path | None = None
+        """Where to keep what compilers print."""
         self._complaints = drivers.Complaints()
+        cpu_name.mend(info.driver_version, device.int_ptr)
         profiling = cl.command_queue_properties.PROFILING_ENABLE
         try:
             self.context = cl.Context([device])
@@ -211,12 +210,13 @@ class Device:
         if self.info.interpreted:
             source = Source(source.text, (*source.options, *INTERPRETED))
         try:
-            with warnings.catch_warnings():
+            with warnings.catch_warnings(), compilers_into(self.compiler_log):
                 warnings.simplefilter("ignore", cl.CompilerWarning)
                 program = cl.Program(self.context, source.text).build(options=list(source.options))
                 kernel = cl.Kernel(program, "track")
         except cl.Error as error:
-            raise BuildError(f"{self.info.label} cannot build the kernel:\n{error}") from error
+            said = f"{self.info.label} cannot build the kernel:\n{error}"
+            raise BuildError(told_first(said, source.text)) from error
         return Program(self, kernel, source, time.perf_counter() - started)
 
     def check_complaints(self) -> None:
@@ -235,6 +235,17 @@ class Program:
         self.source = source
         self.time_build_s = time_build_s
         self._kernel = kernel
+        self._launched: set[tuple] = set()
+
+    @contextmanager
+    def _first_is_quiet(self, size: tuple) -> Iterator[None]:
+        """PoCL compiles at the first launch of a size, and prints then."""
+        if size in self._launched:
+            yield
+            return
+        with compilers_into(self.device.compiler_log):
+            yield
+        self._launched.add(size)
 
     @property
     def binary_bytes(self) -> int | None:
@@ -246,9 +257,9 @@ class Program:
 
     def launch(self, arguments: list, global_size: int, local_size: int) -> float:
         """Run the kernel to its end; returns event seconds (0 where the driver reports none)."""
-        with run_errors(self.device.info.label, "a launch"):
+        size = (global_size,), (local_size,)
+        with run_errors(self.device.info.label, "a launch"), self._first_is_quiet(size):
             self._kernel.set_args(*arguments)
-            size = (global_size,), (local_size,)
             event = cl.enqueue_nd_range_kernel(self.device.queue, self._kernel, *size)
             event.wait()
         self.device.check_complaints()

@@ -12,10 +12,9 @@ import shutil
 import subprocess
 import sys
 
-from freepath import drivers, listing
+from freepath import drivers, listing, selection, trial
 from freepath.drivers import Driver
-from freepath.errors import FAILED
-from freepath.selection import probe
+from freepath.errors import FAILED, DeviceError
 
 INSTALL_S = 1800.0
 """An installation that takes longer is given up."""
@@ -71,22 +70,43 @@ def install(driver: Driver) -> str:
     return "" if not driver.missing else "was installed and is still not found"
 
 
+def install_if_needed() -> int:
+    """Install Intel's runtime where no driver works; returns the exit code."""
+    try:
+        selection.default()
+    except DeviceError as error:
+        intel = drivers.BY_NAME["intel"]
+        print(
+            f"{error}\ninstalling {intel.title} instead: 270 MB, under Intel's licence", flush=True
+        )
+        problem = install(intel)
+        if problem:
+            print(f"MISSING: {problem}", file=sys.stderr)
+            return FAILED
+    return 0
+
+
 def main() -> int:
     """Install what is missing, say what each driver is now; 8 where one is missing or broken."""
+    if sys.argv[1:] == ["--if-needed"]:
+        return install_if_needed()
     missing = [driver for driver in drivers.DRIVERS if driver.missing]
     by_apt = any(text.startswith("apt-get") for driver in missing for text in driver.get)
     if by_apt and not obstacle("apt-get update"):
         run(["apt-get", "update", "-qq"])  # what fails here fails with its reason below
     problems = {driver: install(driver) for driver in missing}
-    found = dict(zip(drivers.DRIVERS, probe(drivers.DRIVERS), strict=True))
-    for driver, infos in found.items():
-        if infos:
-            remarks = "".join(f"; {remark}" for remark in listing.remarks(infos[0]))
-            print(f"{driver.name:12} {infos[0].label}{remarks}")
+    there = [driver for driver in drivers.DRIVERS if driver.find()]
+    tried = dict(zip(there, trial.outcomes(there, afresh=True), strict=True))
+    for driver in drivers.DRIVERS:
+        outcome = tried.get(driver)
+        if outcome and outcome.working:
+            info = outcome.working[0]
+            remarks = "".join(f"; {remark}" for remark in listing.remarks(info))
+            print(f"{driver.name:12} {info.label}{remarks}")
         else:
-            reason = problems.get(driver) or "installed, but its process shows no device"
+            reason = problems.get(driver) or (outcome.reason if outcome else "not installed")
             print(f"{driver.name:12} MISSING: {reason}", file=sys.stderr)
-    return 0 if all(found.values()) else FAILED
+    return 0 if all(d in tried and tried[d].working for d in drivers.DRIVERS) else FAILED
 
 
 if __name__ == "__main__":

@@ -1,8 +1,8 @@
-"""The OpenCL drivers that need no special hardware, and a process of its own for each.
+"""The OpenCL drivers that are known, and a view of one of them alone.
 
-What one of them needs (a folder of .icd files, variables, a command in front) would hide or disturb
-the others, and two builds of LLVM do not get on in one process. A command that is to see one of
-them is therefore run by `in_process_of`, and finds no other device there.
+What one of them needs (a folder of .icd files, variables, a command in front) would hide or
+disturb the others, and two builds of LLVM do not get on in one process. A process therefore sees
+one driver: `enter` makes it so for this process, `in_process_of` for another one.
 """
 
 from __future__ import annotations
@@ -18,37 +18,14 @@ from dataclasses import dataclass, field
 from importlib import metadata
 from pathlib import Path
 
+from freepath.icd import in_icd_files, in_package, strangers
+
 CHOSEN = "FREEPATH_DRIVER"
 """The variable that tells a process which driver it is for."""
-VENDORS = (Path("/etc/OpenCL/vendors"), Path(sys.prefix) / "etc" / "OpenCL" / "vendors")
-"""Where systems and environments keep .icd files, each with the name of a driver's library."""
 STEERING = ("OCL_ICD_", "OPENCL_VENDOR_PATH", "RUSTICL_", "OCLGRIND_", "LD_PRELOAD")
 """Variables of the user that would bring other drivers into a process."""
 INTEL = "libintelocl.so"
 INTERPRETER_LOG = "OCLGRIND_LOG"
-
-
-def in_icd_files(library: str) -> str:
-    """The library that an .icd file names and that is there, by a part of its name; or ''."""
-    for file in (file for folder in VENDORS for file in sorted(folder.glob("*.icd"))):
-        try:
-            named = file.read_text("utf-8", "replace").strip()
-        except OSError:
-            continue
-        # a bare name is for the linker to find; Intel's wheel names a path that is not there
-        if library in named and ("/" not in named or Path(named).exists()):
-            return named
-    return ""
-
-
-def in_package(package: str, library: str) -> str:
-    """The path of a library that came with a package of pip, or ''."""
-    try:
-        files = metadata.files(package) or []
-    except metadata.PackageNotFoundError:
-        return ""
-    found = (Path(file.locate()).resolve() for file in files if file.name == library)
-    return next((str(path) for path in found if path.exists()), "")
 
 
 def _version(package: str) -> str:
@@ -95,7 +72,9 @@ def _apt(package: str) -> tuple[str, ...]:
 
 
 POCL = "Portable Computing Language"
-OTHERS = Driver("others", "what else the system has", "", (), lambda: "others")
+OTHERS = Driver(
+    "others", "what else the system has", "", (), lambda: "others" if strangers() else ""
+)
 """Devices of no known driver, such as GPUs, as the environment has them."""
 DRIVERS = (
     Driver(
@@ -143,24 +122,39 @@ DRIVERS = (
 )
 TimeoutExpired = subprocess.TimeoutExpired
 BY_NAME = {driver.name: driver for driver in (*DRIVERS, OTHERS)}
+LAST = ("rusticl", "oclgrind")
+"""Chosen after what else the system has: one is slow, the other an interpreter."""
+_entered: list[Driver] = []
+
+
+def in_order() -> list[Driver]:
+    """All drivers in the order in which they are chosen."""
+    first = [driver for driver in DRIVERS if driver.name not in LAST]
+    return [*first, OTHERS, *(driver for driver in DRIVERS if driver.name in LAST)]
 
 
 def installed() -> list[Driver]:
-    """The known drivers that are there."""
-    return [driver for driver in DRIVERS if driver.find()]
+    """The drivers that are there, in the order in which they are chosen."""
+    return [driver for driver in in_order() if driver.find()]
 
 
-def current() -> Driver | None:
-    """The driver that this process is for; None where it sees whatever the user's environment has.
+def chosen_by_parent() -> Driver | None:
+    """The driver of this process if `in_process_of` started it.
 
     A name that is not known is taken for none: nobody but `in_process_of` sets it.
     """
     return BY_NAME.get(os.environ.get(CHOSEN, ""))
 
 
+def current() -> Driver | None:
+    """The driver that this process sees; None where it sees whatever the environment has."""
+    return chosen_by_parent() or (_entered[0] if _entered else None)
+
+
 def owner(platform: str, version: str) -> Driver:
     """The installed driver of a device, or OTHERS."""
-    return next((driver for driver in installed() if driver.owns(platform, version)), OTHERS)
+    there = (driver for driver in DRIVERS if driver.find())
+    return next((driver for driver in there if driver.owns(platform, version)), OTHERS)
 
 
 def is_in_view(platform: str, version: str) -> bool:
@@ -187,6 +181,33 @@ def environment_of(driver: Driver, folder: Path) -> dict[str, str]:
     if driver.prefix:
         own[INTERPRETER_LOG] = str(folder / "log")
     return kept | own
+
+
+def enter(driver: Driver, initialise: Callable[[], object]) -> bool:
+    """Let this process see one driver alone from now on; False where it cannot.
+
+    The loader of OpenCL reads the environment once, when `initialise` asks it for platforms. What
+    is set for it is taken back then, so that processes started later are not for this driver.
+    """
+    if current() or driver.prefix:
+        return current() is driver
+    before = dict(os.environ)
+    with tempfile.TemporaryDirectory(prefix="freepath-") as folder:
+        wanted = environment_of(driver, Path(folder))
+        wanted.pop(CHOSEN)
+        try:
+            _become(wanted)
+            initialise()
+        finally:
+            _become(before)
+    _entered.append(driver)
+    return True
+
+
+def _become(environment: Mapping[str, str]) -> None:
+    for name in os.environ.keys() - environment.keys():
+        del os.environ[name]
+    os.environ.update(environment)
 
 
 def in_process_of(
@@ -225,7 +246,8 @@ def in_process_of(
             process.communicate()
             raise
         except BaseException:
-            process.kill()
+            # with what it has started: a command in front of Python ends later than Python
+            os.killpg(process.pid, signal.SIGKILL)
             process.communicate()
             raise
     return subprocess.CompletedProcess(command, process.returncode, out, err)

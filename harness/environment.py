@@ -38,12 +38,17 @@ def _version(package: str) -> str | None:
         return None
 
 
+def packages() -> dict[str, str]:
+    """The versions of the packages that results may depend on."""
+    return {name: version for name in PACKAGES if (version := _version(name))}
+
+
 def describe() -> dict[str, Any]:
     """Host and versions, fit for JSON."""
     return {
         "freepath": __version__,
         "python": platform.python_version(),
-        "packages": {name: version for name in PACKAGES if (version := _version(name))},
+        "packages": packages(),
         "system": f"{platform.system()} {platform.release()}",
         "processor": processor(),
         "cores": os.cpu_count(),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 from freepath import config
@@ -15,6 +14,8 @@ from rich.text import Text
 
 if TYPE_CHECKING:
     from freepath.device import DeviceInfo
+    from freepath.drivers import Driver
+    from freepath.trial import Outcome
 
 Record = dict[str, Any]
 
@@ -99,12 +100,15 @@ def configs() -> list[Record]:
     return records
 
 
-def devices(infos: Iterable[DeviceInfo], driver: str) -> list[Record]:
+def devices(driver: Driver, outcome: Outcome, *, is_default: bool) -> list[Record]:
     """One record a device of a driver."""
+    first = next(iter(outcome.working), None)
     return [
         {
             "device": info.name,
-            "-d": driver,
+            "-d": driver.name,
+            "works": f"no: {why}; {UNUSABLE}" if why else True,
+            "default": "the first that works here" if is_default and info is first else None,
             "platform": info.platform,
             "driver": info.driver_version,
             "kind": info.kind,
@@ -115,8 +119,11 @@ def devices(infos: Iterable[DeviceInfo], driver: str) -> list[Record]:
             "timing source": info.timing_source,
             "remarks": remarks(info),
         }
-        for info in infos
+        for info, why in zip(outcome.devices, outcome.failures, strict=True)
     ]
+
+
+UNUSABLE = "use another driver, or update this one"
 
 
 def remarks(info: DeviceInfo) -> list[str]:
@@ -129,9 +136,9 @@ def remarks(info: DeviceInfo) -> list[str]:
     return found
 
 
-def not_there(name: str, title: str, missing: str) -> Record:
+def not_there(driver: Driver, missing: str) -> Record:
     """The record of a driver without a device."""
-    return {"device": title, "-d": name, "missing": missing}
+    return {"device": driver.title, "-d": driver.name, "missing": missing}
 
 
 def records_of(what: str, catalog: Catalog) -> list[Record]:

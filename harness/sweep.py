@@ -9,6 +9,7 @@ from typing import Any
 from freepath import equal_time, limits, majorants, source
 from freepath.binding import Scene, runner_of, structure_of
 from freepath.catalog import Catalog
+from freepath.compilers import first_error
 from freepath.confirm import SETTLED, confirmed_rows
 from freepath.device import Device, Program
 from freepath.errors import BuildError, DriverLimitError, FreepathError, RunError
@@ -22,7 +23,6 @@ from freepath.runner import KernelData
 from freepath.source import Source, Structure
 from freepath.stopping import Rule
 
-REASON_LENGTH = 300
 CRASHED = {
     "status": "crashed",
     "reason": f"the process ended {TWICE} times while this case was built or run; "
@@ -107,6 +107,7 @@ class Sweep:
 
     def run(self, scene: Scene, jobs: list[Job], seed: int) -> None:
         """Build and measure the jobs of one scene side by side; each row is written as it ends."""
+        self.device.compiler_log = self.folder.folder / "compiler.log"
         ready = []
         for job in jobs:
             if self.deaths_at(job) >= TWICE:
@@ -154,7 +155,7 @@ class Sweep:
             except BuildError as error:
                 self._programs[text.sha256] = error
                 log = self.folder.write_log(f"build-{text.sha256[:12]}.log", str(error))
-                raise BuildError(f"{first_error(error)} (all of it in {log.name})") from error
+                raise BuildError(f"{first_error(error)} ({log.name})") from error
             self._programs[text.sha256] = program
             self._add_build(job, program.time_build_s)
         found = self._programs[text.sha256]
@@ -240,10 +241,3 @@ class Sweep:
     def _finish(self, job: Job, row: dict[str, Any], *further: Iterable[dict[str, Any]]) -> None:
         self.folder.append(row, *further)
         self.on_done(row)
-
-
-def first_error(error: Exception) -> str:
-    """The line of a compiler's log or a driver's message that says what is wrong."""
-    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
-    naming = [line for line in lines if "error:" in line.lower()]
-    return (naming or lines)[0][:REASON_LENGTH]

@@ -1,9 +1,13 @@
 """A small catalog of made-up trackers, so that tests of configs do not depend on the kernels."""
 
 import os
+import shutil
 
 import pytest
 from freepath import catalog
+
+if "FREEPATH_TEST_DEVICE" in os.environ:
+    os.environ["FREEPATH_DEVICE"] = os.environ["FREEPATH_TEST_DEVICE"]
 
 SMALL_TRACKERS = {
     "exact": "estimands: [transmittance, free_path]\nneeds: [closed_form]",
@@ -48,15 +52,20 @@ def load_text(tmp_path, monkeypatch, small_catalog):
 
 
 @pytest.fixture(scope="session")
-def device():
-    """The PoCL that comes with pip where it is installed, else the first device."""
-    from freepath.device import open_devices
-    from freepath.errors import DeviceError
+def trials():
+    """The file of what drivers' trials showed, for caches that begin empty."""
+    from freepath import trial
 
-    try:
-        return open_devices(["3.0"])[0]
-    except DeviceError:
-        return open_devices([])[0]
+    trial.of_installed()
+    return trial.cache_file()
+
+
+@pytest.fixture(scope="session")
+def device(trials):
+    """The device that no -d means: $FREEPATH_DEVICE, or the first that works."""
+    from freepath.selection import one_device
+
+    return one_device([])
 
 
 @pytest.fixture
@@ -67,9 +76,11 @@ def selector(device):
 
 
 @pytest.fixture
-def work(tmp_path, monkeypatch):
-    """An empty working directory, with a cache of its own."""
+def work(tmp_path, monkeypatch, trials):
+    """An empty working directory, with a cache of its own that knows the drivers."""
     monkeypatch.setenv("FREEPATH_CACHE", str(tmp_path / "cache"))
+    (tmp_path / "cache").mkdir()
+    shutil.copy(trials, tmp_path / "cache")
     folder = tmp_path / "work"
     folder.mkdir()
     monkeypatch.chdir(folder)
@@ -77,22 +88,7 @@ def work(tmp_path, monkeypatch):
 
 
 @pytest.fixture(scope="session")
-def device_under_test():
-    """$FREEPATH_TEST_DEVICE, else the PoCL that comes with pip, else the first device."""
-    from freepath.device import open_devices
-    from freepath.errors import DeviceError
-
-    chosen = os.environ.get("FREEPATH_TEST_DEVICE")
-    if chosen:
-        return open_devices([chosen])[0]
-    try:
-        return open_devices(["3.0"])[0]
-    except DeviceError:
-        return open_devices([])[0]
-
-
-@pytest.fixture(scope="session")
-def rig(device_under_test, tmp_path_factory):
+def rig(device, tmp_path_factory):
     from freepath.check.rig import Rig
 
-    return Rig(device_under_test, catalog.load(), tmp_path_factory.mktemp("rig"))
+    return Rig(device, catalog.load(), tmp_path_factory.mktemp("rig"))

@@ -9,11 +9,11 @@ import sys
 import time
 
 import pytest
-from freepath import cli, drivers, selection
-from freepath import device as devices
+from freepath import cli, drivers, selection, trial
 from freepath.commands.listing import LISTS
 from freepath.drivers import Driver
 from freepath.results import read_rows
+from freepath.selection import Part
 
 SWEEP = """\
 name: small
@@ -85,7 +85,7 @@ MISTAKES = [
     ("nope", "nope: expected a config file or the name of one that comes with freepath"),
     ("quik", "did you mean 'quick'?"),
     (".", ".: expected a file, got a directory"),
-    ("small.yaml -d zzz", "no OpenCL device matches 'zzz'; there are\n  "),
+    ("small.yaml -d zzz", "no OpenCL device matches 'zzz'; -d takes\n  "),
     ("small.yaml -d ''", "no OpenCL device matches ''"),
     ("small.yaml -a speed=1", "-a speed=1: unknown axis 'speed'"),
     ("small.yaml -a tightness=x", "expected a number > 0, got 'x'"),
@@ -136,15 +136,22 @@ def test_nothing_matched(call):
 
 
 def test_no_opencl_at_all(call, monkeypatch):
-    monkeypatch.setattr(devices.cl, "get_platforms", list)
-    monkeypatch.setattr(drivers, "DRIVERS", ())
-    code, out, err = call("run", "small.yaml")
-    assert (code, out) == (2, "")
-    assert "pip install 'freepath[pocl]'" in err
+    monkeypatch.delenv("FREEPATH_DEVICE", raising=False)
+    absent = Driver("absent", "A driver", "Maker", ("pip install it",), lambda: "")
+    crash = (sys.executable, "-c", "import os; os.abort()")
+    dying = Driver("dying", "A driver", "Maker", (), lambda: "yes", prefix=crash)
+    monkeypatch.setattr(drivers, "DRIVERS", (absent, dying))
+    monkeypatch.setattr(drivers, "strangers", dict)
+    reasons = "dying: its process was ended by SIGABRT", "absent: not installed; `make devices`"
+    for words in (["run", "small.yaml"], ["check"], ["source", "small.yaml", "--case", "1"]):
+        code, out, err = call(*words)
+        assert (code, out) == (2, "")
+        assert err.startswith("freepath: no OpenCL driver works here:\n")
+        assert all(reason in err for reason in reasons)
     code, out, err = call("devices")
-    assert (code, out.strip()) == (0, "")
-    assert "pip install 'freepath[pocl]'" in err
-    assert call("devices", "--json")[:2] == (0, "[]\n")
+    assert code == 0
+    assert "no OpenCL driver works here" in err
+    assert all(text in " ".join(out.split()) for text in ("ended by SIGABRT", "pip install it"))
     assert call("run", "small.yaml", "-N")[0] == 0
 
 
@@ -265,6 +272,10 @@ def test_devices(call, device):
     for driver in drivers.DRIVERS:
         shown = [record for record in records if record["-d"] == driver.name]
         assert [record.get("missing") for record in shown] == [driver.missing or None]
+        assert all(record["works"] is True for record in shown if "works" in record)
+    (default,) = [record for record in records if record.get("default")]
+    names = [record["-d"] for record in records if record.get("works") is True]
+    assert default["-d"] == names[0], "the default is the first that works"
 
 
 def test_a_run_on_all_devices_has_rows_and_a_table_of_each(call, work):
@@ -272,7 +283,7 @@ def test_a_run_on_all_devices_has_rows_and_a_table_of_each(call, work):
     code, out, err = call("run", "small.yaml", "-R", "regular", "-d", "all", "-o", "out")
     assert code == 0, err
     rows = read_rows(work / "out" / "summary.csv")
-    there = drivers.installed()
+    there = list(trial.of_installed())
     owners = [drivers.owner(row["platform"], row["driver_version"]) for row in rows]
     assert owners[: len(there)] == there
     assert {row["status"] for row in rows} == {"ok"}
@@ -289,8 +300,6 @@ def test_a_run_on_all_devices_has_rows_and_a_table_of_each(call, work):
 DIES = """\
 import os, sys
 words = sys.argv[1:]
-if "devices" in words:
-    os.execv(words[0], words)
 from freepath import cli
 from freepath.results import ResultFolder
 append = ResultFolder.append
@@ -306,14 +315,18 @@ def test_what_a_driver_that_crashed_did_not_finish_is_told(call, work, monkeypat
     there = drivers.installed()
     if not there:
         pytest.skip("no known driver is installed")
+    infos = selection.resolve([there[0].name])[0].infos
     dying = dataclasses.replace(there[0], prefix=(sys.executable, "-c", DIES))
     mute = Driver("mute", "A driver", "", (), lambda: "yes", prefix=(sys.executable, "-c", "1/0"))
-    parts = [(mute, ["all"]), (dying, ["all"])]
-    monkeypatch.setattr(selection, "processes_of", lambda _: parts)
+    idle = Driver("idle", "A driver", "", (), lambda: "yes")
+    parts = [Part(idle, [], "it hangs"), Part(mute, infos), Part(dying, infos)]
+    monkeypatch.setattr(selection, "resolve", lambda _: parts)
+    monkeypatch.setattr(selection, "checked", lambda parts: parts)
     code, out, err = call("run", "small.yaml", "-d", "all", "-o", "out")
     assert code == 8
     assert "mute: its process ended with exit code 1" in err
-    assert "mute: it showed no device, so that none of 2 cases was run" in err
+    assert "idle cannot be used here: it hangs" in err
+    assert "mute: 2 of 2 cases were not finished on " in err
     assert f"{dying.name}: its process was ended by SIGABRT" in err
     assert f"{dying.name}: 1 of 2 cases were not finished on " in err
     (row,) = read_rows(work / "out" / "summary.csv")
@@ -322,7 +335,7 @@ def test_what_a_driver_that_crashed_did_not_finish_is_told(call, work, monkeypat
     assert "same command and -o out --resume" in err
     assert row["case"].split("/")[1] in out
     # and nothing at all is no result, nor a mistake of the user's
-    parts[:] = [(mute, ["all"])]
+    parts[:] = [Part(mute, infos)]
     assert call("run", "small.yaml", "-d", "all", "-o", "none")[0] == 8
 
 

@@ -2,9 +2,10 @@ import os
 import sys
 
 import pytest
-from freepath import device_setup, drivers
+from freepath import device_setup, drivers, trial
 from freepath.device_setup import command_of, install, obstacle
 from freepath.drivers import Driver
+from freepath.trial import Outcome
 
 
 def made_up(get, found=""):
@@ -42,12 +43,31 @@ def test_what_fails_says_why(monkeypatch):
 
 @pytest.mark.parametrize("works", [True, False])
 def test_what_is_missing_is_said_and_the_others_are_still_there(monkeypatch, capsys, device, works):
-    missing = made_up("pip install a")
+    missing = made_up("pip install a", found="there" if works else "")
     monkeypatch.setattr(drivers, "DRIVERS", (missing, made_up("pip install b", found="there")))
-    shown = [[device.info] if works else [], [device.info]]
-    monkeypatch.setattr(device_setup, "probe", lambda wanted: shown)
+    fine = Outcome((device.info,), ("",))
+    monkeypatch.setattr(trial, "outcomes", lambda wanted, afresh: [fine for _ in wanted])
     monkeypatch.setattr(device_setup, "run", lambda command: "no network")
+    monkeypatch.setattr(sys, "argv", ["device_setup"])
     assert device_setup.main() == (0 if works else 8)
     out, err = capsys.readouterr()
     assert out.count(device.info.label) == (2 if works else 1)
     assert ("MISSING: `pip install a`: no network" in err) != works
+
+
+def test_intel_s_runtime_is_installed_only_where_nothing_works(monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", ["device_setup", "--if-needed"])
+    installed = []
+    monkeypatch.setattr(device_setup, "install", lambda driver: installed.append(driver.name) or "")
+    assert device_setup.main() == 0
+    assert (installed, capsys.readouterr().out) == ([], "")
+    monkeypatch.setattr(drivers, "DRIVERS", (made_up("pip install a"),))
+    monkeypatch.setattr(drivers, "strangers", dict)
+    assert device_setup.main() == 0
+    out = capsys.readouterr().out
+    assert installed == ["intel"]
+    assert "made-up: not installed" in out
+    assert "270 MB, under Intel's licence" in out
+    monkeypatch.setattr(device_setup, "install", lambda driver: "no network")
+    assert device_setup.main() == 8
+    assert "MISSING: no network" in capsys.readouterr().err

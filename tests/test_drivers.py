@@ -1,14 +1,12 @@
-import json
-import os
 import signal
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
-from freepath import device, drivers, selection
-from freepath.drivers import BY_NAME, CHOSEN, DRIVERS, OTHERS, Driver, environment_of
-from freepath.errors import DeviceError
+from freepath import drivers, icd
+from freepath.drivers import BY_NAME, CHOSEN, DRIVERS, OTHERS, environment_of
+from support.made_up import made_up
 
 
 @pytest.fixture
@@ -16,31 +14,27 @@ def vendors(tmp_path, monkeypatch):
     """A folder of .icd files that stands for the system's."""
     folder = tmp_path / "vendors-of-the-system"
     folder.mkdir()
-    monkeypatch.setattr(drivers, "VENDORS", (tmp_path / "none", folder))
+    monkeypatch.setattr(icd, "VENDORS", (tmp_path / "none", folder))
     return folder
 
 
-def made_up(name="made-up", found="yes", **given):
-    return Driver(name, "A driver", "Maker", ("apt-get install it",), lambda: found, **given)
-
-
 def test_a_library_is_found_by_an_icd_file(vendors):
-    assert drivers.in_icd_files("libpocl") == ""
+    assert icd.in_icd_files("libpocl") == ""
     (vendors / "a.icd").write_text("libpocl.so.2\n")
     (vendors / "b.icd").write_text("/nowhere/libintelocl.so\n")
-    assert drivers.in_icd_files("libpocl") == "libpocl.so.2"
-    assert drivers.in_icd_files("libintelocl.so") == "", "the path that it names is not there"
+    assert icd.in_icd_files("libpocl") == "libpocl.so.2"
+    assert icd.in_icd_files("libintelocl.so") == "", "the path that it names is not there"
     library = vendors / "libintelocl.so"
     library.touch()
     (vendors / "c.icd").write_text(f"{library}\n")
-    assert drivers.in_icd_files("libintelocl.so") == str(library)
+    assert icd.in_icd_files("libintelocl.so") == str(library)
 
 
 def test_a_library_is_found_in_a_package():
-    found = drivers.in_package("numpy", "__init__.py")
+    found = icd.in_package("numpy", "__init__.py")
     assert Path(found).is_file()
-    assert drivers.in_package("numpy", "no such file") == ""
-    assert drivers.in_package("no-such-package", "__init__.py") == ""
+    assert icd.in_package("numpy", "no such file") == ""
+    assert icd.in_package("no-such-package", "__init__.py") == ""
 
 
 def test_what_is_missing_comes_with_how_to_get_it():
@@ -129,70 +123,3 @@ def test_complaints_are_told_once(monkeypatch, tmp_path):
     log.write_text("\n Invalid read \n\n")
     assert complaints.new() == "Invalid read"
     assert complaints.new() == ""
-
-
-def test_here_will_do_for_what_is_seen_here(monkeypatch, selector):
-    monkeypatch.delenv(CHOSEN, raising=False)
-    assert selection.processes_of([]) == []
-    assert selection.processes_of([selector]) == []
-    monkeypatch.setenv(CHOSEN, "pocl-wheel")
-    assert selection.processes_of(["all"]) == []
-
-
-def test_names_and_all_mean_processes(monkeypatch):
-    others = [OTHERS] if OTHERS in selection.everywhere(device.list_devices()) else []
-    expected = [(driver, ["all"]) for driver in [*drivers.installed(), *others]]
-    assert selection.processes_of(["all"]) == expected
-    there = made_up()
-    monkeypatch.setattr(drivers, "BY_NAME", {"made-up": there})
-    assert selection.processes_of([" Made-Up "]) == [(there, ["all"])]
-    monkeypatch.setattr(drivers, "BY_NAME", {"made-up": made_up(found="")})
-    with pytest.raises(DeviceError, match="made-up: not installed; `make devices`"):
-        selection.processes_of(["made-up"])
-
-
-def test_a_device_that_is_seen_in_another_process_only(monkeypatch, device):
-    hidden = made_up("hidden")
-    record = device.info.__class__(**{**vars(device.info), "name": "Cray-1", "platform": "Maker"})
-    monkeypatch.setattr(drivers, "DRIVERS", (*DRIVERS, hidden))
-    monkeypatch.setattr(
-        selection, "probe", lambda wanted: [[record] if d is hidden else [] for d in wanted]
-    )
-    assert selection.processes_of(["cray"]) == [(hidden, ["all"])]
-    with pytest.raises(DeviceError, match=r"no OpenCL device matches 'cray-2'.*\n(.*\n)*.*Cray-1"):
-        selection.processes_of(["cray-2"])
-
-
-def test_drivers_that_differ_by_their_version_alone_are_refused(monkeypatch, device):
-    one, two = made_up("one"), made_up("two")
-    versions = {one: "1.0", two: "2.0"}
-
-    def probe(wanted):
-        given = vars(device.info)
-        return [[type(device.info)(**given | {"driver_version": versions[d]})] for d in wanted]
-
-    monkeypatch.setattr(selection, "probe", probe)
-    with pytest.raises(DeviceError, match=r"^one and two differ by .* 1\.0\), .* 2\.0\); run each"):
-        selection.planned([(one, ["all"]), (two, ["all"])])
-    # what is not selected is in nobody's way
-    assert [len(infos) for infos in selection.planned([(one, ["all"]), (two, ["cray"])])] == [1, 0]
-
-
-def test_probing_tells_nothing_of_what_crashes_or_babbles():
-    crash = made_up("crash", prefix=(sys.executable, "-c", "import os; os.abort()"))
-    babble = made_up("babble", prefix=(sys.executable, "-c", "print('no JSON')"))
-    absent = made_up("absent", prefix=("no-such-program",))
-    assert selection.probe([crash, babble, absent]) == [[], [], []]
-
-
-def test_probing_a_driver_gives_its_devices():
-    there = drivers.installed()
-    if not there:
-        pytest.skip("no known driver is installed")
-    (infos,) = selection.probe(there[:1])
-    assert infos
-    assert all(drivers.owner(info.platform, info.driver_version) == there[0] for info in infos)
-    command = [sys.executable, "-m", "freepath", "devices", "--json"]
-    environment = {**os.environ, CHOSEN: there[0].name}
-    listed = subprocess.run(command, env=environment, check=True, capture_output=True, text=True)
-    assert [record["name"] for record in json.loads(listed.stdout)] == [i.name for i in infos]

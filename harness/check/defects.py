@@ -20,8 +20,8 @@ from freepath.check.planted_numbers import NUMBERS
 from freepath.check.planted_paths import PATHS
 from freepath.check.rig import Change, Rig
 from freepath.check.verdict import Failure
-from freepath.device import open_devices
 from freepath.errors import FAILED
+from freepath.selection import one_device
 
 DEFECTS: tuple[Defect | HostDefect, ...] = KERNELS + NUMBERS + PATHS + HOST
 
@@ -54,7 +54,7 @@ def main(arguments: Sequence[str]) -> int:
     print("| planted defect | caught by | which said |\n| --- | --- | --- |")
     missed = 0
     with tempfile.TemporaryDirectory(prefix="freepath-defects-") as folder:
-        rig = Rig(open_devices(list(arguments[:1]))[0], known, Path(folder))
+        rig = Rig(one_device(list(arguments[:1])), known, Path(folder))
         for defect in DEFECTS:
             if not all(part in defect.what for part in arguments[1:]):
                 continue

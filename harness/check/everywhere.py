@@ -10,8 +10,8 @@ from pathlib import Path
 
 from freepath import drivers
 from freepath.check.outcome import Outcome
-from freepath.drivers import Driver
 from freepath.errors import FAILED
+from freepath.selection import Parts, selector_of
 
 ByDevice = dict[str, list[Outcome]]
 
@@ -33,7 +33,7 @@ def read(path: Path) -> tuple[ByDevice, list[str]]:
 
 
 def run(
-    parts: Sequence[tuple[Driver, Sequence[str]]],
+    parts: Parts,
     arguments: Sequence[str],
     tell: Callable[[str], None],
 ) -> Iterator[tuple[ByDevice, list[str], int]]:
@@ -41,11 +41,14 @@ def run(
 
     A driver whose process ends without a word is unusable; those after it still run.
     """
-    for driver, selectors in parts:
+    for driver, infos, failure in parts:
+        if failure:
+            yield {}, [f"{driver.name} cannot be used here: {failure}"], FAILED
+            continue
         tell(f"{driver.name}: {driver.title}")
         with tempfile.TemporaryDirectory(prefix="freepath-check-") as folder:
             path = Path(folder) / "outcomes.json"
-            chosen = [word for selector in selectors for word in ("-d", selector)]
+            chosen = [word for info in infos for word in ("-d", selector_of(info))]
             command = ["check", *arguments, *chosen, "--outcomes", str(path)]
             code = drivers.in_process_of(driver, command).returncode
             if path.exists():

@@ -8,29 +8,16 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
+from freepath import drivers
 from freepath.check import printing
 from freepath.check.model import Check
 from freepath.check.outcome import Outcome
 from freepath.check.pool import Pool, Task
 from freepath.check.worker import Setting
-from freepath.device import NO_DEVICE, DeviceInfo, list_devices, matches
-from freepath.errors import DeviceError
+from freepath.device import DeviceInfo
+from freepath.selection import selector_of
 
 Chosen = Sequence[tuple[int, Check]]
-
-
-def devices_of(selectors: Sequence[str]) -> list[DeviceInfo]:
-    """The devices that -d means: the first without it; raises DeviceError where there is none."""
-    known = list_devices()
-    if not known:
-        raise DeviceError(NO_DEVICE)
-    if not selectors:
-        return known[:1]
-    for selector in selectors:
-        if not any(matches(info, selector) for info in known):
-            names = "\n".join(f"  {info.label}" for info in known)
-            raise DeviceError(f"no OpenCL device matches '{selector}'; there are\n{names}")
-    return [info for info in known if any(matches(info, selector) for selector in selectors)]
 
 
 @dataclass(frozen=True)
@@ -70,7 +57,8 @@ class Session:
         ]
         progress = printing.Progress(self.chosen, len(tasks))
         setting = Setting(
-            f"{info.platform} / {info.name} / {info.driver_version}",
+            selector_of(info),
+            seen.name if (seen := drivers.current()) else "",
             trackers=tuple(options.trackers),
             arithmetic=options.arithmetic,
             storage=options.storage,

@@ -12,16 +12,17 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 
 import numpy as np
-from freepath import catalog
+from freepath import catalog, drivers
 from freepath.check import registry
 from freepath.check.model import LEVEL, Check
 from freepath.check.outcome import FAILED, PASSED, SKIPPED
 from freepath.check.rig import SEED, Rig
 from freepath.check.verdict import Failure, NotApplicable, chance_of_smallest, hearing
-from freepath.device import open_devices
+from freepath.device import list_devices, open_devices
 from freepath.drivers import INTERPRETER_LOG
 from freepath.errors import DriverLimitError, FreepathError
 from freepath.scene.cache import reading_only
+from freepath.selection import one_device
 
 STRIDE = 1_000_003
 """Between the seeds of repeats: more than the checks add to them."""
@@ -33,6 +34,8 @@ class Setting:
 
     device: str | None
     """A selector, or None for the first."""
+    driver: str = ""
+    """What the process is to see; '' where that is to be found out."""
     trackers: Sequence[Path] = ()
     seed: int = SEED
     arithmetic: str = "strict"
@@ -54,7 +57,11 @@ def serve(connection: Connection, setting: Setting, folder: Path) -> None:
     os.environ[INTERPRETER_LOG] = str(folder / "log")
     try:
         known = catalog.load(setting.trackers)
-        device = open_devices([setting.device] if setting.device else [])[0]
+        if setting.driver:
+            drivers.enter(drivers.BY_NAME[setting.driver], list_devices)
+            device = open_devices([setting.device])[0]
+        else:
+            device = one_device([setting.device] if setting.device else [])
         rig = Rig(device, known, folder, setting.seed)
         rig = rig.with_arithmetic(setting.arithmetic).with_storage(setting.storage)
     except FreepathError as error:

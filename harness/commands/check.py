@@ -181,8 +181,9 @@ def _run(options: Namespace, chosen: list[tuple[int, Check]]) -> int:
     from freepath import selection
     from freepath.check import everywhere, files, repeats, session
 
-    parts = selection.processes_of(options.device)
-    infos = [] if parts else session.devices_of(options.device)
+    parts = selection.resolve(options.device)
+    here = selection.can_be_here(parts)
+    infos = parts[0].infos if here else []
     running = session.Session(
         chosen,
         session.Options(
@@ -203,7 +204,7 @@ def _run(options: Namespace, chosen: list[tuple[int, Check]]) -> int:
     files.write_junit(options.output_junit, running.outcomes)
     unusable: list[str] = []
     try:
-        if parts:
+        if not here:
             unusable += _run_in_processes(options, parts, running)
         for info in infos:
             unusable += _run_on(running, info)

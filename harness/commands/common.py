@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import sys
 from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -58,5 +60,8 @@ def console_of(*, stderr: bool = False) -> Console:
         def on_broken_pipe(self) -> None:
             raise BrokenPipeError  # which main knows; rich would exit with 1
 
-    console = Plain(stderr=stderr)
-    return console if console.is_terminal else Plain(stderr=stderr, width=160)
+    # compilers' output is led away from descriptor 2, and the progress is not
+    apart = stderr and sys.stderr.isatty()
+    given = {"file": os.fdopen(os.dup(2), "w")} if apart else {"stderr": stderr}
+    console = Plain(**given)
+    return console if console.is_terminal else Plain(**given, width=160)

@@ -1,9 +1,7 @@
-"""`freepath devices`: what OpenCL finds, with each known driver in a process of its own."""
+"""`freepath devices`: which drivers there are, which of them work here, which is the default."""
 
 from __future__ import annotations
 
-import dataclasses
-import json
 import sys
 from argparse import Namespace
 from typing import Any
@@ -16,8 +14,9 @@ def add(commands: Any) -> None:
     devices = commands.add_parser(
         "devices",
         help="list the OpenCL devices",
-        description="List the OpenCL devices, and the known drivers that are not installed; -d of "
-        "the other commands takes part of a name, or what stands behind -d here.",
+        description="Try each OpenCL driver in a process of its own, and list what works, in the "
+        "order in which freepath chooses. -d of the other commands takes part of a device's name, "
+        "or what stands behind -d here.",
         allow_abbrev=False,
     )
     devices.add_argument("--json", action="store_true", help="as JSON")
@@ -25,29 +24,24 @@ def add(commands: Any) -> None:
 
 def execute(options: Namespace) -> int:
     """Run it; returns the exit code."""
-    from freepath import drivers
-    from freepath.device import NO_DEVICE, list_devices
+    from freepath import drivers, icd, listing, trial
 
-    if drivers.current() and options.json:  # asked by `selection.probe`
-        print(json.dumps([dataclasses.asdict(info) for info in list_devices()], indent=1))
-        return 0
-    records = _records()
-    if all("missing" in record for record in records) and not options.json:
-        print(f"freepath: {NO_DEVICE}", file=sys.stderr)
-    return print_records(records, as_json=options.json)
-
-
-def _records() -> list[dict[str, Any]]:
-    """The devices of each driver, or what is missing; those of no known driver come last."""
-    from freepath import drivers, listing, selection
-    from freepath.device import list_devices
-
-    wanted = selection.everywhere(list_devices())
-    found = dict(zip(wanted, selection.probe(wanted), strict=True))
+    tried = trial.of_installed(afresh=True)
+    chosen = next((driver for driver, outcome in tried.items() if outcome.working), None)
     records = []
-    for driver in (*drivers.DRIVERS, drivers.OTHERS):
-        records += listing.devices(found.get(driver, []), driver.name)
-        if driver is not drivers.OTHERS and not found.get(driver):
-            missing = driver.missing or "installed, but its process shows no device"
-            records.append(listing.not_there(driver.name, driver.title, missing))
-    return records
+    for driver in drivers.in_order():
+        outcome = tried.get(driver)
+        if outcome is None:
+            if driver is not drivers.OTHERS:
+                records.append(listing.not_there(driver, driver.missing))
+        elif not outcome.devices:
+            records.append(listing.not_there(driver, f"cannot be used: {outcome.failure}"))
+        else:
+            records += listing.devices(driver, outcome, is_default=driver is chosen)
+    for file, library in icd.strangers().items():
+        if not icd.is_there(library):
+            what = f"{file} names {library}, which is not there: install it, or remove the file"
+            records.append({"device": file.name, "missing": what})
+    if chosen is None:
+        print("freepath: no OpenCL driver works here", file=sys.stderr)
+    return print_records(records, as_json=options.json)

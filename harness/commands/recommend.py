@@ -99,8 +99,8 @@ def execute(options: Namespace) -> int:
     from freepath import catalog, recommend, session
     from freepath.commands.common import console_of, volume_of
     from freepath.commands.run import _shown_progress
-    from freepath.device import open_devices
     from freepath.errors import UsageError
+    from freepath.selection import one_device
 
     clock = session.Clock(time.perf_counter())
     medium = {"volume": volume_of(options.volume, options.sigma_t, options.grid)}
@@ -108,7 +108,7 @@ def execute(options: Namespace) -> int:
     folder = options.output or session.new_folder(f"recommend-{options.volume.stem}")
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise UsageError(f"{folder}: expected a folder that is empty or not there yet")
-    device = open_devices(options.device)[0]
+    device = one_device(options.device)
     console = console_of()
     told = {"highlight": False, "markup": False, "soft_wrap": True}
     with _shown_progress(console) as (_, on_progress):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import re
 import sys
 import time
 from argparse import Namespace
@@ -15,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import shtab
 from freepath.arguments import add_config, add_device
 from freepath.commands.common import cases_of, console_of
-from freepath.errors import FAILED, INTERRUPTED
+from freepath.errors import FAILED, INTERRUPTED, USAGE
 
 if TYPE_CHECKING:
     from freepath.device import DeviceInfo
@@ -77,19 +78,19 @@ def execute(options: Namespace) -> int:
     if options.show_only:
         return _show_only(options, cases)
     from freepath import environment, selection, session
-    from freepath.device import open_devices
 
     load = environment.load()
-    parts = selection.processes_of(options.device)
-    devices = [] if parts else open_devices(options.device)
+    parts = selection.checked(selection.resolve(options.device))
+    here = selection.can_be_here(parts)
+    devices = selection.opened(parts) if here else []
     path = options.output or (session.newest_folder if options.resume else session.new_folder)(
         loaded.name
     )
     folder = _folder(path, options)
-    if parts:
+    if not here:
         failed = _run_in_processes(options, parts, folder, cases)
         shown = _show(options, folder, cases, load) if folder.holds_rows else 0
-        return max(shown, FAILED if failed else 0)
+        return max(shown, failed)
     console = console_of(stderr=options.json)
     with _shown_progress(console) as (on_done, on_progress):
         clock, told = session.Clock(started), (on_done, on_progress)
@@ -106,19 +107,25 @@ def execute(options: Namespace) -> int:
 
 def _run_in_processes(
     options: Namespace, parts: Parts, folder: ResultFolder, cases: list[Case]
-) -> bool:
+) -> int:
     """Run each driver's devices in its process, one after the other, into one folder.
 
-    Tells whether one of them crashed or could not do what was wanted; the others still run.
+    Returns the exit code: FAILED where one of them crashed or could not do what was wanted; the
+    others still run. What is wrong with the config or its files is said by the first, once.
     """
     from freepath import drivers, selection
 
-    failed = False
-    for (driver, selectors), infos in zip(parts, selection.planned(parts), strict=True):
+    failed = 0
+    for driver, infos, failure in parts:
+        if failure:
+            print(f"freepath: {driver.name} cannot be used here: {failure}", file=sys.stderr)
+            failed = FAILED
+            continue
         arguments = ["run", options.config, "-o", str(folder.folder), "--rows-only"]
         if options.resume or folder.holds_rows:
             arguments.append("--resume")
         arguments += ["--json"] * options.json + ["--confirm"] * options.confirm
+        selectors = [selection.selector_of(info) for info in infos]
         for flag, values in (("-d", selectors), ("-a", options.axis), ("-R", [options.include])):
             arguments += [word for value in values if value is not None for word in (flag, value)]
         arguments += ["-E", options.exclude] * (options.exclude is not None)
@@ -128,10 +135,12 @@ def _run_in_processes(
         code = drivers.in_process_of(driver, arguments).returncode
         if code == INTERRUPTED:
             raise KeyboardInterrupt
+        if code == USAGE:
+            return USAGE
         if code != 0:
             print(f"freepath: {drivers.how_it_ended(driver, code)}", file=sys.stderr)
             _say_what_is_missing(driver, infos, cases, folder)
-        failed |= code != 0
+            failed = FAILED
     return failed
 
 
@@ -235,12 +244,20 @@ def _in_order(rows: list[dict[str, str]], cases: list[Case]) -> list[dict[str, s
 
 
 def _say_failures(rows: list[dict[str, str]]) -> int:
+    """Say what failed, each cause once; returns the exit code."""
     from freepath import table
 
-    failed = table.failures(rows)
-    for row in failed:
-        print(f"freepath: {row['status']}: {row['case']}: {row['reason']}", file=sys.stderr)
-    return FAILED if failed else 0
+    causes: dict[tuple[str, str], list[str]] = {}
+    for row in table.failures(rows):
+        # a log is of one case; what it says may be what others say
+        cause = re.sub(r" \(build-\w+\.log\)$", "", row["reason"])
+        causes.setdefault((row["status"], cause), []).append(row["case"])
+    for (status, reason), names in causes.items():
+        several = f"{len(names)} cases, the first of them {names[0]}"
+        print(
+            f"freepath: {status}: {reason}: {several if names[1:] else names[0]}", file=sys.stderr
+        )
+    return FAILED if causes else 0
 
 
 def _print_tables(console: Console, rows: list[dict[str, str]], load: float) -> None:

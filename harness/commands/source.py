@@ -32,13 +32,13 @@ def execute(options: Namespace) -> int:
     loaded, known, cases = cases_of(options)
     case = _chosen(options, cases)
     from freepath import binding, session, source
-    from freepath.device import open_devices
     from freepath.scene import build_medium
+    from freepath.selection import one_device
 
     if case.skip_reason:
         print(f"freepath: {case.name} has no source: {case.skip_reason}", file=sys.stderr)
         return USAGE
-    device = open_devices(options.device)[0]
+    device = one_device(options.device)
     medium = build_medium(case.medium, session.search_path(loaded))
     structure = binding.structure_of(case, known, medium, device, count=False)
     print(source.compose(structure).text)

@@ -66,15 +66,15 @@ def execute(options: Namespace) -> int:
     """Run it; returns the exit code."""
     from freepath import candidate, session
     from freepath.commands.common import console_of, volume_of
-    from freepath.device import open_devices
     from freepath.results import ResultFolder
+    from freepath.selection import one_device
 
     clock = session.Clock(time.perf_counter())
     known, tracker = candidate.read(options.tracker)
     volume = volume_of(options.volume, options.sigma_t) if options.volume else None
     path = options.output or session.new_folder(f"try-{tracker.name}")
     folder = ResultFolder(path)
-    device = open_devices(options.device)[0]
+    device = one_device(options.device)
     console = console_of()
     console.print(f"{tracker.title}, on {device.info.label}", highlight=False, markup=False)
     candidate.build(device, known, tracker)

@@ -13,6 +13,7 @@ from freepath.check.outcome import Outcome
 from freepath.cli import main
 from freepath.drivers import Driver
 from freepath.errors import DriverLimitError
+from freepath.selection import Part
 
 READS_NOTHING = """/*---
 title: A tracker that reads what nobody has written
@@ -53,8 +54,8 @@ def test_all_drivers(there, work, capfd):
 def test_a_driver_that_dies_takes_no_other_with_it(monkeypatch, work, capfd):
     crash = (sys.executable, "-c", "import os; os.abort()")
     dying = Driver("dying", "A driver", "Maker", (), lambda: "yes", prefix=crash)
-    fine = drivers.installed()[0]
-    monkeypatch.setattr(selection, "processes_of", lambda _: [(dying, ["all"]), (fine, ["all"])])
+    fine = selection.default()
+    monkeypatch.setattr(selection, "resolve", lambda _: [Part(dying, fine.infos), fine])
     assert main(["check", "-d", "all", "-R", "^hard/bad-input/nan$"]) == 8
     out, err = capfd.readouterr()
     assert "dying: its process was ended by SIGABRT" in err

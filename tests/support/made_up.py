@@ -1,0 +1,7 @@
+"""Drivers that nobody has."""
+
+from freepath.drivers import Driver
+
+
+def made_up(name="made-up", found="yes", **given):
+    return Driver(name, "A driver", "Maker", ("apt-get install it",), lambda: found, **given)
