@@ -266,7 +266,9 @@ def test_a_tracker_that_does_not_compile_is_a_row(go, work):
         assert "nonsense" in row["reason"]
         assert row["estimate"] == row["time_per_sample_s"] == row["rounds"] == ""
     assert found[REGULAR]["status"] == "ok"
-    assert "build_failed: transmittance/homogeneous-1/global/t1/broken" in printed.err
+    (said,) = printed.err.splitlines()
+    assert said.startswith("freepath: build_failed: trackers/broken.cl:7:")
+    assert "2 cases, the first of them transmittance/homogeneous-1/global/t1/broken" in said
     log = re.search(r"build-\w+\.log", broken[0]["reason"])[0]
     assert "nonsense" in (work / "out" / log).read_text()
     # what failed is tried again, what is done is not

@@ -6,7 +6,7 @@ import sys
 from xml.etree import ElementTree
 
 import pytest
-from freepath import drivers, selection
+from freepath import drivers, selection, trial
 from freepath.check import everywhere, worker
 from freepath.check.model import TINY, Check
 from freepath.check.outcome import Outcome
@@ -35,7 +35,7 @@ static void step(Path *path, const Scene *scene, Rng *rng)
 
 @pytest.fixture
 def there():
-    found = drivers.installed()
+    found = list(trial.of_installed())
     if len(found) < 2:
         pytest.skip("fewer than two drivers are installed")
     return found
