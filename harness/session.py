@@ -18,7 +18,7 @@ from freepath.catalog import Catalog
 from freepath.config import Config
 from freepath.device import Device
 from freepath.errors import FreepathError
-from freepath.pictures import are_there
+from freepath.pictures import are_there, openimageio
 from freepath.plan import Case
 from freepath.results import SCHEMA_VERSION, ResultFolder, key_of
 from freepath.scene import build_medium
@@ -121,6 +121,8 @@ class Run:
         The folder is made when all that can be wrong with config and volumes has been found. Its
         run.json is there from then on, and says at the end how the run ended.
         """
+        if self.config.render:
+            openimageio()  # or the pictures would be missed only when all is measured
         self.on_progress(0.0, len(self.cases) * len(devices), "preparing scenes")
         scenes = build_scenes(self.cases, search_path(self.config))
         plans = [(sweep, self._plan(sweep, scenes)) for sweep in map(self._sweep, devices)]
