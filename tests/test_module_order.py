@@ -25,6 +25,7 @@ ORDER = (
     ("limits", "selection"),
     ("runner",),
     ("measure", "journal"),
+    ("geometry",),
     ("results",),
     ("rows", "table", "binding", "confirm", "pictures"),
     ("equal_time", "report", "compare"),
