@@ -1,11 +1,15 @@
 # make sweep   sets everything up in .venv and runs the first sweep
 # make test    sets up what the tests need and runs them all
 # make devices installs further OpenCL drivers for the CPU, as far as that is possible here
+# make kit     makes a folder that sets freepath up where there is no package index, and tries it
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+# what wheels of the kit are for: the Python of .venv, unless another one is named (3.12)
+KIT_PYTHON ?=
+KIT_OPTIONS ?=
 
-.PHONY: sweep test devices lint schema clean
+.PHONY: sweep test devices kit lint schema clean
 
 sweep: $(VENV)/installed
 	$(BIN)/python -m freepath.device_setup --if-needed
@@ -18,6 +22,9 @@ test: $(VENV)/installed-for-tests
 # had is said, and the others are installed all the same.
 devices: $(VENV)/installed
 	$(BIN)/python -m freepath.device_setup
+
+kit: $(BIN)/python
+	$(BIN)/python packaging/make_kit.py kit $(if $(KIT_PYTHON),--python $(KIT_PYTHON)) $(KIT_OPTIONS)
 
 lint: $(VENV)/installed-for-tests
 	$(BIN)/ruff check harness tests
@@ -43,4 +50,4 @@ $(VENV)/installed-for-tests: $(VENV)/installed
 	touch $@
 
 clean:
-	rm -rf $(VENV) $(VENV)-maker build dist *.egg-info
+	rm -rf $(VENV) $(VENV)-maker kit build dist *.egg-info

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from freepath import cpu_name, drivers
 from freepath.compilers import compilers_into, told_first
-from freepath.errors import BuildError, DeviceError, RunError
+from freepath.errors import BuildError, DeviceError, DriverLimitError, RunError
 from freepath.source import SCALARS, Source
 
 # pyopencl's cache of binaries is keyed without the environment that steers a driver's compiler, and
@@ -32,6 +32,8 @@ LLVMPIPE_LOOPS = 65535
 """Mesa 22.3 silently ends all loops of a work-item after so many rounds of them together."""
 LLVMPIPE_GROUP = 8
 """llvmpipe follows so many work-items of a group in step; smaller groups leave it idle."""
+WorkItems = tuple[int, int]
+"""Global and local size of a launch."""
 
 
 @dataclass(frozen=True)
@@ -156,9 +158,11 @@ class Device:
 
     def __init__(self, device: cl.Device, info: DeviceInfo):
         self.info = info
-        self._device = device
         self.compiler_log: Path | None = None
         """Where to keep what compilers print."""
+        self.work_group: int | None = None
+        """The local size that the user wants."""
+        self.cl_device = device
         self._complaints = drivers.Complaints()
         cpu_name.mend(info.driver_version, device.int_ptr)
         profiling = cl.command_queue_properties.PROFILING_ENABLE
@@ -168,15 +172,25 @@ class Device:
         except cl.Error as error:
             raise DeviceError(f"{info.label}: cannot be opened: {error}") from error
 
+    def group_by(self, size: int | None) -> None:
+        """Run all kernels in work-groups of this size; DeviceError where the device has none."""
+        most = self.cl_device.max_work_group_size
+        if size is not None and not 1 <= size <= most:
+            expected = f"expected 1 to {most} work-items of a group"
+            raise DeviceError(f"--work-group {size}: {self.info.label}: {expected}")
+        self.work_group = size
+
     @property
-    def work_items(self) -> tuple[int, int]:
-        """Global and local size: the loop is persistent, so a few work-items a core suffice."""
+    def work_items(self) -> WorkItems:
+        """Sizes to begin with: the loop is persistent, so a few work-items a core suffice."""
+        units = self.info.compute_units
+        group, groups = min(64, self.cl_device.max_work_group_size), 16 * units
         if self.info.loop_limit:
-            return LLVMPIPE_GROUP * self.info.compute_units, LLVMPIPE_GROUP
-        if self.info.kind == "CPU":
-            return 4 * self.info.compute_units, 1
-        local = min(64, self._device.max_work_group_size)
-        return self.info.compute_units * local * 16, local
+            group, groups = LLVMPIPE_GROUP, units
+        elif self.info.kind == "CPU":
+            group, groups = 1, 4 * units
+        wanted = self.work_group or group
+        return max(units, groups * group // wanted) * wanted, wanted
 
     def upload(self, array: np.ndarray | None) -> cl.Buffer:
         """Copy an array to the device; None or an empty one becomes a buffer of one element."""
@@ -236,6 +250,8 @@ class Program:
         self.time_build_s = time_build_s
         self._kernel = kernel
         self._launched: set[tuple] = set()
+        self.work_items = self._fitting(*device.work_items)
+        self.calibrated = False
 
     @contextmanager
     def _first_is_quiet(self, size: tuple) -> Iterator[None]:
@@ -246,6 +262,23 @@ class Program:
         with compilers_into(self.device.compiler_log):
             yield
         self._launched.add(size)
+
+    def _fitting(self, items: int, local: int) -> WorkItems:
+        """The device's sizes, in smaller groups where a kernel's registers allow no larger."""
+        most = self.told("WORK_GROUP_SIZE") or local
+        if self.device.work_group and local > most:
+            raise DriverLimitError(f"this kernel runs in work-groups of {most} here, not {local}")
+        while local > most:
+            local //= 2
+        return items // local * local, local
+
+    def told(self, what: str) -> int | None:
+        """What CL_KERNEL_WORK_GROUP_INFO says of the kernel; None where a driver says nothing."""
+        try:
+            asked = getattr(cl.kernel_work_group_info, what)
+            return int(self._kernel.get_work_group_info(asked, self.device.cl_device))
+        except (cl.Error, AttributeError):
+            return None
 
     @property
     def binary_bytes(self) -> int | None:

@@ -5,12 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from difflib import get_close_matches
+from importlib import import_module
+from typing import Any
 
 EXCERPT_WIDTH = 100
 USAGE = 2
 NOTHING_MATCHED = 5
 FAILED = 8
 INTERRUPTED = 130
+PACKAGES = {"vl_convert": "vl-convert-python"}
+"""Packages of modules that have another name."""
 
 
 class FreepathError(Exception):
@@ -76,6 +80,20 @@ class VolumeError(FreepathError):
 
 class DeviceError(FreepathError):
     """No OpenCL device, or none that matches."""
+
+
+class MissingPackageError(FreepathError):
+    """A package that is needed for some work only, and is not here."""
+
+
+def imported(module: str, purpose: str) -> Any:
+    """Import a package that most work does without; MissingPackageError says what needs it."""
+    try:
+        return import_module(module)
+    except ImportError as error:
+        name = PACKAGES.get(module, module)
+        told = f"{purpose}: needs {name}, which cannot be imported here ({error})"
+        raise MissingPackageError(f"{told}; `pip install {name}`") from error
 
 
 class NothingMatchedError(FreepathError):

@@ -7,6 +7,7 @@ import math
 import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from freepath.errors import RunError
@@ -136,12 +137,12 @@ class Bench:
     def _counted(self) -> Round:
         """Count for a while, or so many samples that exact runs can be compared count by count."""
         if self.rule.samples is None:
-            return self._run_for(self.counting, COUNTING_S)
+            return self.run_for(self.counting, COUNTING_S)
         self._first_run(self.counting)
-        return self._run(self.counting, 0, Shape(1, min(self.rule.samples, EXACTLY_COUNTED)))
+        return self.run(self.counting, 0, Shape(1, min(self.rule.samples, EXACTLY_COUNTED)))
 
     def _calibrated(self) -> Shape:
-        rays, one = self.timed.rays, self._run_for(self.timed, ENOUGH_S)
+        rays, one = self.timed.rays, self.run_for(self.timed, ENOUGH_S)
         seconds = min(ROUND_S, self.rule.at_most_s / LEAST_ROUNDS)
         wanted = min(int(seconds / one.time_per_sample_s), MOST_SAMPLES) // rays
         if self.rule.samples is not None:
@@ -150,7 +151,7 @@ class Bench:
             wanted = min(self.rule.samples // self.rule.rounds, MOST_SAMPLES // rays)
         return shape_of(wanted, rays, one.time_per_sample_s, self.timed.lanes_in_all)
 
-    def _run_for(self, runner: Runner, seconds: float) -> Round:
+    def run_for(self, runner: Runner, seconds: float) -> Round:
         """Run ever more samples until they take so long; returns the last run."""
         one, per_ray = self._first_run(runner), 1
         # by the wall's clock the first run is compilation for the most part
@@ -159,7 +160,7 @@ class Bench:
                 break
             per_ray = math.ceil(per_ray * max(2, min(8, 2 * seconds / one.time_s)))
             shape = shape_of(per_ray, runner.rays, one.time_per_sample_s, runner.lanes_in_all)
-            one = self._run(runner, 0, shape)
+            one = self.run(runner, 0, shape)
         return one
 
     def _first_run(self, runner: Runner) -> Round:
@@ -172,9 +173,10 @@ class Bench:
         found.time_device_s += one.time_device_s
         return one
 
-    def _run(self, runner: Runner, first_sample: int, shape: Shape) -> Round:
+    def run(self, runner: Runner, first_sample: int, shape: Shape, **options: Any) -> Round:
+        """Take samples of every ray, with the options of `Runner.run`; their time is noted."""
         started = time.perf_counter()
-        one = runner.run(first_sample, shape.samples, shape.blocks)
+        one = runner.run(first_sample, shape.samples, shape.blocks, **options)
         self.measurement.time_wall_s += time.perf_counter() - started
         self.measurement.time_device_s += one.time_s
         return one
@@ -182,7 +184,7 @@ class Bench:
     def step(self) -> None:
         """Measure one round more, and note in the measurement whether and why it was the last."""
         found = self.measurement
-        found.add(self._run(self.timed, self._taken, self._next))
+        found.add(self.run(self.timed, self._taken, self._next))
         self._taken += self._next.per_ray
         self._next = next(self._shapes, None)
         if self._next is None:

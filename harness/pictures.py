@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from freepath.errors import FreepathError
+from freepath.errors import FreepathError, imported
 from freepath.results import PLACE
 from freepath.stats import Moments
 
@@ -54,6 +54,11 @@ LONGEST_STEM = 150
 PLACE_DIGITS = 8
 
 Attributes = dict[str, str]
+
+
+def openimageio() -> Any:
+    """The library that reads and writes pictures; raises MissingPackageError where it is not."""
+    return imported("OpenImageIO", "pictures of cases")
 
 
 def write_pictures(folder: Path, row: Mapping[str, Any], rays: Any, moments: Moments) -> str:
@@ -124,7 +129,7 @@ def write_exr(base: Path, mean: np.ndarray, error: np.ndarray, attributes: Attri
 
     In float32; raises FreepathError or OSError where the file cannot be written.
     """
-    import OpenImageIO as oiio
+    oiio = openimageio()
 
     parts = {"mean": mean, "variance": error}
     specs = [_spec(pixels, name, attributes) for name, pixels in parts.items()]
@@ -141,7 +146,7 @@ def write_exr(base: Path, mean: np.ndarray, error: np.ndarray, attributes: Attri
 
 
 def _spec(pixels: np.ndarray, part: str, attributes: Attributes) -> Any:
-    import OpenImageIO as oiio
+    oiio = openimageio()
 
     height, width, channels = pixels.shape
     spec = oiio.ImageSpec(width, height, channels, oiio.FLOAT)
@@ -157,7 +162,7 @@ def read_exr(path: Path) -> tuple[Attributes, dict[str, np.ndarray]]:
 
     Raises FreepathError where the file cannot be read.
     """
-    import OpenImageIO as oiio
+    oiio = openimageio()
 
     image = oiio.ImageInput.open(str(path))
     _check(image, image)
@@ -183,7 +188,7 @@ def write_png(
     base: Path, pixels: np.ndarray, attributes: Attributes, *, linear: bool = True
 ) -> None:
     """Write RGB in [0, 1] as sRGB, `linear` or encoded already."""
-    import OpenImageIO as oiio
+    oiio = openimageio()
 
     result = oiio.ImageBuf(np.ascontiguousarray(pixels, dtype=np.float32))
     if linear:
@@ -230,7 +235,7 @@ def _replaced(base: Path, suffix: str) -> Iterator[Path]:
 
 def _check(succeeded: Any, image: Any) -> None:
     """Raise FreepathError with what OpenImageIO says is wrong."""
-    import OpenImageIO as oiio
+    oiio = openimageio()
 
     if not succeeded:
         message = (image.geterror() if image else oiio.geterror()).strip()

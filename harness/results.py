@@ -13,7 +13,7 @@ from typing import Any
 from freepath.errors import FreepathError
 from freepath.journal import Journal
 
-SCHEMA_VERSION = 4
+SCHEMA_VERSION = 5
 SUMMARY, SAMPLES, CONFIRM, RUN = "summary.csv", "samples.csv", "confirm.csv", "run.json"
 CHECKS = "checks.json"
 """What became of the checks of a tracker on trial."""
@@ -24,12 +24,12 @@ COLUMNS = (
     "device", "platform", "driver_version",
     "tracker", "estimand", "medium", "channels", "majorant", "tightness", "effects",
     "light", "scatterings", "p_absorb", "shadow", "composition",
-    "arithmetic", "storage", "lanes", "params", "seed",
+    "arithmetic", "storage", "lanes", "work_items", "work_group", "params", "seed",
     "rays", "samples_per_ray", "rounds", "stopped",
     "lookups_per_sample", "crossings_per_sample", "steps_per_sample", "lane_occupancy",
     "time_per_sample_s", "time_per_sample_cv", "time_noise", "timing_source",
     "time_device_s", "time_wall_s", "device_time_share", "time_build_s",
-    "source_bytes", "binary_bytes", "lookups_per_s",
+    "source_bytes", "binary_bytes", "private_bytes", "lookups_per_s",
     "estimate", "reference", "bias", "bias_stderr", "bias_rms", "z_score",
     "variance", "variance_noise", "rmse",
     "inv_efficiency_lookups", "inv_efficiency_s",

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pyopencl as cl
 from freepath import limits
-from freepath.device import COUNTERS, Device, Program, scalar_type
+from freepath.device import COUNTERS, Device, Program, WorkItems, scalar_type
 from freepath.stats import Moments, merge_blocks
 
 STEP_CAP = 1 << 20
@@ -159,7 +159,7 @@ class Runner:
     @property
     def lanes_in_all(self) -> int:
         """Paths that the device follows at once."""
-        return self._device.work_items[0] * self.lanes
+        return self.program.work_items[0] * self.lanes
 
     def run(
         self,
@@ -169,7 +169,7 @@ class Runner:
         *,
         launches: int | None = None,
         record: bool = False,
-        work_items: tuple[int, int] | None = None,
+        work_items: WorkItems | None = None,
     ) -> Round:
         """Take `blocks` blocks of `samples` samples of every ray.
 
@@ -179,7 +179,7 @@ class Runner:
         parts = limits.parts_of(samples, self._device.info)
         samples, blocks = samples // parts, blocks * parts
         units = self.rays * blocks
-        work_items = work_items or self._device.work_items
+        work_items = work_items or self.program.work_items
         lanes = work_items[0] * self.lanes
         outputs = self._outputs(units, work_items[0], samples if record else 0)
         time_device, iterations, first, started = 0.0, 0, 0, time.perf_counter()
@@ -228,7 +228,7 @@ class Runner:
         return min(left, max(self.lanes_in_all, self._pace.fit(left * samples) // samples))
 
     def _launch(
-        self, samples: range, first: int, end: int, outputs: Outputs, work_items: tuple[int, int]
+        self, samples: range, first: int, end: int, outputs: Outputs, work_items: WorkItems
     ) -> float:
         """Run units first to end; `samples` are the numbers of the first block. Event seconds."""
         started = time.perf_counter()

@@ -18,7 +18,7 @@ from freepath.catalog import Catalog
 from freepath.config import Config
 from freepath.device import Device
 from freepath.errors import FreepathError
-from freepath.pictures import are_there
+from freepath.pictures import are_there, openimageio
 from freepath.plan import Case
 from freepath.results import SCHEMA_VERSION, ResultFolder, key_of
 from freepath.scene import build_medium
@@ -111,6 +111,8 @@ class Run:
     """Told how many cases are done, of how many, and what is being done."""
     confirm: bool = False
     """Whether the error that each case predicts is measured as well."""
+    work_group: int | None = None
+    """Work-items of a group; None for what is best known or found."""
     run_id: str = dataclasses.field(default_factory=lambda: uuid.uuid4().hex[:12])
     total: int = 0
     ended: int = 0
@@ -121,6 +123,10 @@ class Run:
         The folder is made when all that can be wrong with config and volumes has been found. Its
         run.json is there from then on, and says at the end how the run ended.
         """
+        for device in devices:
+            device.group_by(self.work_group)
+        if self.config.render:
+            openimageio()  # or the pictures would be missed only when all is measured
         self.on_progress(0.0, len(self.cases) * len(devices), "preparing scenes")
         scenes = build_scenes(self.cases, search_path(self.config))
         plans = [(sweep, self._plan(sweep, scenes)) for sweep in map(self._sweep, devices)]
@@ -146,7 +152,9 @@ class Run:
             self.folder.close()
 
     def _is_whole(self, row: dict[str, str]) -> bool:
-        """Whether the pictures of a row are there, where the config wants them."""
+        """Whether a row ran in the wanted work-groups, and the pictures that it needs are there."""
+        if self.work_group and row["work_group"] not in ("", str(self.work_group)):
+            return False
         rays = self.cases[0].rays  # all cases of a config fly the same
         return not self.config.render or are_there(self.folder.folder, row, rays)
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
-from freepath import equal_time, limits, majorants, source
+from freepath import equal_time, geometry, limits, majorants, source
 from freepath.binding import Scene, runner_of, structure_of
 from freepath.catalog import Catalog
 from freepath.compilers import first_error
@@ -141,10 +141,14 @@ class Sweep:
         rule = Rule(stop.error, stop.time_noise, stop.at_most, samples, stop.rounds)
         rule = rule.confirming(SETTLED) if self.confirm else rule
         bench = Bench(timed, counting, rule)
+        if geometry.is_open(self.device.info):
+            geometry.choose(bench)
         bench.prepare()
         self._add_build(job, bench.measurement.time_compile_s)
         job.row["source_bytes"] = len(job.timed.text.encode())
         job.row["binary_bytes"] = timed.program.binary_bytes
+        job.row["work_items"], job.row["work_group"] = timed.program.work_items
+        job.row["private_bytes"] = timed.program.told("PRIVATE_MEM_SIZE")
         job.bench = bench
 
     def _program(self, job: Job, text: Source) -> Program:

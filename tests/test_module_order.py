@@ -26,6 +26,7 @@ ORDER = (
     ("selection",),
     ("runner",),
     ("measure", "journal"),
+    ("geometry",),
     ("results",),
     ("rows", "table", "binding", "confirm", "pictures"),
     ("equal_time", "report", "compare"),
@@ -38,7 +39,7 @@ ORDER = (
     ("__main__",),
 )
 PLACE = {name: place for place, names in enumerate(ORDER) for name in names}
-LONGEST = 300
+LONGEST = 330
 ONLY_CSV = {
     "table": {"errors"},
     # the pictures of a run are files beside its CSV

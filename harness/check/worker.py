@@ -20,7 +20,7 @@ from freepath.check.rig import SEED, Rig
 from freepath.check.verdict import Failure, NotApplicable, chance_of_smallest, hearing
 from freepath.device import list_devices, open_devices
 from freepath.drivers import INTERPRETER_LOG
-from freepath.errors import DriverLimitError, FreepathError
+from freepath.errors import DriverLimitError, FreepathError, MissingPackageError
 from freepath.scene.cache import reading_only
 from freepath.selection import one_device
 
@@ -96,7 +96,7 @@ def _verdict(rig: Rig, check: Check) -> tuple[str, str]:
         return SKIPPED, reason
     try:
         check.run(rig, LEVEL)
-    except NotApplicable as error:
+    except (NotApplicable, MissingPackageError) as error:
         return SKIPPED, str(error)
     except DriverLimitError as error:
         # of a driver without limits it is a fault, whosever it is

@@ -66,6 +66,13 @@ def add(commands: Any) -> None:
         help="measure the error of each case at three more sample counts, write it beside the "
         "prediction into confirm.csv, and tell how many predictions hold",
     )
+    run.add_argument(
+        "--work-group",
+        type=int,
+        metavar="N",
+        help="run kernels in work-groups of N work-items (default: 1 on CPUs, and elsewhere the "
+        "fastest of a short calibration)",
+    )
     run.add_argument("--json", action="store_true", help="print the rows as JSON, nothing else")
     # given to the process of a driver: who started it shows the rows of all
     run.add_argument("--rows-only", action="store_true", help=argparse.SUPPRESS)
@@ -95,6 +102,7 @@ def execute(options: Namespace) -> int:
     with _shown_progress(console) as (on_done, on_progress):
         clock, told = session.Clock(started), (on_done, on_progress)
         sweep = session.Run(loaded, known, cases, folder, clock, *told, options.confirm)
+        sweep.work_group = options.work_group
         try:
             sweep.execute(devices)
         except KeyboardInterrupt:
@@ -126,6 +134,8 @@ def _run_in_processes(
             arguments.append("--resume")
         arguments += ["--json"] * options.json + ["--confirm"] * options.confirm
         selectors = [selection.selector_of(info) for info in infos]
+        if options.work_group is not None:
+            arguments += ["--work-group", str(options.work_group)]
         for flag, values in (("-d", selectors), ("-a", options.axis), ("-R", [options.include])):
             arguments += [word for value in values if value is not None for word in (flag, value)]
         arguments += ["-E", options.exclude] * (options.exclude is not None)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from freepath.errors import FreepathError
+from freepath.errors import FreepathError, imported
 from freepath.report.data import Report, load
 
 FORMATS = ("html", "md", "svg", "png")
@@ -32,8 +32,8 @@ def write(
 ) -> tuple[Report, Path]:
     """Write the report of results, into `output` or a file of the first one's folder.
 
-    Raises FreepathError where a result cannot be read, a file not be written, or a chart has
-    nothing to show.
+    Raises FreepathError where a result cannot be read, a file not be written, a package is missing,
+    or a chart has nothing to show.
     """
     report, data, chosen = made(results, output, wanted, chart)
     output = output or results[0] / f"report.{chosen}"
@@ -52,6 +52,9 @@ def made(
     report = load(results)
     if not report.measured:
         raise FreepathError("the result has no case that was measured, so there is no report of it")
+    if chosen != "md":
+        for module in ("altair", "vl_convert"):
+            imported(module, f"a report as {chosen}")
     if chosen == "html":
         from freepath.report.page import page
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from freepath.errors import VolumeError
+from freepath.errors import VolumeError, imported
 from numpy.typing import NDArray
 
 #: One or three numbers in the header of an EXR file's first part.
@@ -23,7 +23,7 @@ def read_slices(path: Path) -> tuple[NDArray, NDArray[np.float64]]:
     attribute `freepath:voxel_size`. Raises VolumeError for what is no such image, is cut short, has
     more than one channel or slices of different size or type.
     """
-    import OpenImageIO as oiio
+    oiio = imported("OpenImageIO", str(path))
 
     image = oiio.ImageInput.open(str(path))
     if image is None:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 from freepath.effects import SKY_COLUMNS, SKY_ROWS
-from freepath.errors import VolumeError
+from freepath.errors import VolumeError, imported
 from freepath.scene.files import find_file
 from freepath.scene.medium import Array
 from numpy.typing import NDArray
@@ -83,7 +83,7 @@ def read_sky(light: Any, channels: int, search_path: Iterable[str | Path] = ()) 
 
 def _read(path: Path) -> Array:
     """Read the first part of an image file, [rows, columns, channels]."""
-    import OpenImageIO as oiio
+    oiio = imported("OpenImageIO", str(path))
 
     image = oiio.ImageInput.open(str(path))
     if image is None:
@@ -124,7 +124,7 @@ def _checked(path: Path, pixels: Array) -> Array:
 
 def _resampled(path: Path, pixels: Array) -> Array:
     """Average over the table's pixels, or repeat where the image is coarser than the table."""
-    import OpenImageIO as oiio
+    oiio = imported("OpenImageIO", str(path))
 
     given = oiio.ImageBuf(np.ascontiguousarray(pixels, dtype=np.float32))
     size = oiio.ROI(0, SKY_COLUMNS, 0, SKY_ROWS, 0, 1, 0, pixels.shape[2])

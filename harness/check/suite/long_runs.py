@@ -13,7 +13,7 @@ from freepath.check.model import TINY, Check
 from freepath.check.rig import Rig
 from freepath.check.suite.common import UPWARD
 from freepath.check.verdict import Failure, demand, require
-from freepath.errors import FreepathError
+from freepath.errors import VolumeError, imported
 from scipy import stats
 
 BILLION = 1_000_000_000
@@ -156,7 +156,7 @@ def _refused(make: Make, name: str) -> Callable[[Rig, float], None]:
         medium = {"volume": {"file": str(path), "voxel_size": 0.25}}
         try:
             rig.flight(tracker="delta", medium=medium, lanes=1)
-        except FreepathError as error:
+        except VolumeError as error:
             text = str(error)
             demand(path.name in text, f"the message does not name the file: {text}")
             demand(wanted in text, f"the message lacks '{wanted}': {text}")
@@ -168,7 +168,7 @@ def _refused(make: Make, name: str) -> Callable[[Rig, float], None]:
 
 def _save_slices(path: Path, values: np.ndarray) -> None:
     """Write an image with a slice along z in each of its parts or pages."""
-    import OpenImageIO as oiio
+    oiio = imported("OpenImageIO", path.name)
 
     specs = [oiio.ImageSpec(*values.shape[:0:-1], 1, oiio.FLOAT) for _ in values]
     for number, spec in enumerate(specs):
