@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from freepath.columns import COLUMNS, CONFIRM_COLUMNS, SAMPLE_COLUMNS, TEXTS
 from freepath.errors import FreepathError
 from freepath.journal import Journal
 
@@ -18,43 +19,6 @@ SUMMARY, SAMPLES, CONFIRM, RUN = "summary.csv", "samples.csv", "confirm.csv", "r
 CHECKS = "checks.json"
 """What became of the checks of a tracker on trial."""
 LOCK = ".lock"
-# fmt: off
-COLUMNS = (
-    "schema_version", "run_id", "case_id", "case", "status", "reason",
-    "device", "platform", "driver_version",
-    "tracker", "estimand", "medium", "channels", "majorant", "tightness", "effects",
-    "light", "scatterings", "p_absorb", "shadow", "composition",
-    "arithmetic", "storage", "lanes", "params", "seed",
-    "rays", "samples_per_ray", "rounds", "stopped",
-    "lookups_per_sample", "crossings_per_sample", "steps_per_sample", "lane_occupancy",
-    "time_per_sample_s", "time_per_sample_cv", "time_noise", "timing_source",
-    "time_device_s", "time_wall_s", "device_time_share", "time_build_s",
-    "source_bytes", "binary_bytes", "lookups_per_s",
-    "estimate", "reference", "bias", "bias_stderr", "bias_rms", "z_score",
-    "variance", "variance_noise", "rmse",
-    "inv_efficiency_lookups", "inv_efficiency_s",
-    "time_to_10pct_s", "time_to_1pct_s", "time_to_0.1pct_s",
-    "truncated", "nonfinite", "violations", "counted_samples",
-    "source_sha256", "config_sha256",
-)
-SAMPLE_COLUMNS = (
-    "schema_version", "run_id", "case_id", "device", "platform", "round",
-    "samples", "first_sample_of_ray", "time_device_s", "time_wall_s", "iterations",
-    "estimate", "variance",
-)
-CONFIRM_COLUMNS = (
-    "schema_version", "run_id", "case_id", "case", "device", "platform",
-    "estimand", "medium", "tracker", "reference", "rays", "samples_per_ray", "repeats",
-    "time_s", "drift", "rmse_predicted", "rmse_measured", "rmse_low", "rmse_high",
-)
-TEXTS = frozenset((
-    "run_id", "case_id", "case", "status", "reason", "device", "platform", "driver_version",
-    "tracker", "estimand", "medium", "majorant", "effects", "light", "scatterings", "p_absorb",
-    "shadow", "composition", "arithmetic", "storage", "params", "stopped",
-    "timing_source", "source_sha256", "config_sha256",
-))
-# fmt: on
-"""Columns that are no numbers, even where they look like one: a case_id may be 123456789012."""
 PLACE = ("case_id", "device", "platform")
 """What a row is about: a later row of the same place takes its place."""
 KEY = (*PLACE, "driver_version", "config_sha256", "source_sha256")

@@ -10,7 +10,7 @@ FOLDER = Path(freepath.__file__).parent
 # Each line may import those above it and none of its own or below.
 ORDER = (
     ("version",),
-    ("__init__", "errors", "environment"),
+    ("__init__", "errors", "environment", "columns"),
     ("config",),
     ("kernel_files",),
     ("catalog",),
@@ -43,7 +43,7 @@ ONLY_CSV = {
     # the pictures of a run are files beside its CSV
     "report": {"errors", "results", "table", "report", "version", "pictures"},
     "compare": {"errors", "results", "table", "compare"},
-    "results": {"errors", "journal"},
+    "results": {"errors", "journal", "columns"},
     "journal": {"errors"},
 }
 """What modules may import that work on rows of CSV and on nothing else."""

@@ -89,6 +89,8 @@ class Kind(Model):
     """One kind of medium, majorant, tracker or rays with its parameters."""
 
     kind: ClassVar[str] = ""
+    NEEDS: ClassVar[frozenset[str]] = frozenset()
+    """What a tracker takes beside the extinction at a point; of other kinds nothing."""
 
     @model_serializer(mode="wrap")
     def _as_written(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
