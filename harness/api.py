@@ -2,12 +2,54 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from freepath.results import SUMMARY, ResultFolder, read_rows, records
+
+if TYPE_CHECKING:
+    from freepath.catalog import Catalog
+    from freepath.config import Config
+    from freepath.device import Device
+    from freepath.plan import Case
+    from freepath.sweep import Sweep
+
+
+def sweep(  # noqa: PLR0913 (what a sweep is made of; most has a default)
+    config: str | Path | Config,
+    output: str | Path | None = None,
+    *,
+    devices: Sequence[str | Device] = (),
+    axes: Sequence[str] = (),
+    known: Catalog | None = None,
+    cases: list[Case] | None = None,
+    resume: bool = False,
+    confirm: bool = False,
+    **more: Any,
+) -> Sweep:
+    """Make a sweep, whose `run()` measures it.
+
+    `config` is a path, the name of a config that ships, or one that is loaded; `output` the folder
+    for the results (default: results/NAME-TIME, with `resume` the newest of these). `devices` are
+    what -d takes, or open ones; `axes` what -a takes. `known` are the trackers (default: the
+    shipped ones), `cases` those of the config that are wanted (default: all). A `listener` and a
+    `clock` may be given. Raises FreepathError with the message that the command line prints.
+    """
+    from freepath import catalog, plan, results
+    from freepath import config as configs
+    from freepath.device import open_devices
+    from freepath.sweep import Sweep
+
+    known = known or catalog.load()
+    if isinstance(config, (str, Path)):
+        config = configs.load(configs.find(str(config)), known.parameter_models(), list(axes))
+    cases = cases or plan.expand(config, known)
+    named = all(isinstance(one, str) for one in devices)
+    opened = open_devices(list(devices)) if named else list(devices)
+    path = output or (results.newest_folder if resume else results.new_folder)(config.name)
+    folder = ResultFolder(Path(path), resume=resume, confirm=confirm)
+    return Sweep(config, known, cases, opened, folder, confirm=confirm, **more)
 
 
 def run(
@@ -25,28 +67,20 @@ def run(
     done; True prints a line a case. Returns what `load` does. Raises FreepathError with the message
     that the command line prints, and KeyboardInterrupt with what was measured left in the folder.
     """
-    from freepath import catalog, plan, session
-    from freepath import config as configs
-    from freepath.device import open_devices
+    from freepath.sweep import Listener
 
-    clock = session.Clock(time.perf_counter())
-    known = catalog.load([])
-    loaded = configs.load(configs.find(str(config)), known.parameter_models(), list(axes))
-    cases = plan.select(plan.expand(loaded, known), None, None)
-    opened = open_devices(list(devices))
-    folder = ResultFolder(Path(output) if output else session.new_folder(loaded.name))
-    on_done = _say if progress is True else _ignore
-    on_progress = progress if callable(progress) else _ignore
-    session.Run(loaded, known, cases, folder, clock, on_done, on_progress).execute(opened)
-    return load(folder.folder)
+    listener = Listener()
+    if progress is True:
+        listener.row = _say
+    elif callable(progress):
+        listener.progress = progress
+    prepared = sweep(config, output, devices=devices, axes=axes, listener=listener)
+    prepared.run()
+    return load(prepared.folder.folder)
 
 
 def _say(row: dict[str, Any]) -> None:
     print(f"{row['status']:>8}  {row['case']}")
-
-
-def _ignore(*_: Any) -> None:
-    pass
 
 
 def load(result: str | Path) -> Any:

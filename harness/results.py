@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import csv
+import datetime
 import json
 import math
 import os
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -19,6 +21,8 @@ SUMMARY, SAMPLES, CONFIRM, RUN = "summary.csv", "samples.csv", "confirm.csv", "r
 CHECKS = "checks.json"
 """What became of the checks of a tracker on trial."""
 LOCK = ".lock"
+RESULTS = Path("results")
+STAMP = "%Y%m%d-%H%M%S"
 PLACE = ("case_id", "device", "platform")
 """What a row is about: a later row of the same place takes its place."""
 KEY = (*PLACE, "driver_version", "config_sha256", "source_sha256")
@@ -194,6 +198,22 @@ class ResultFolder:
         """The files of the run."""
         names = (SUMMARY, SAMPLES, *([CONFIRM] if self._confirm else []), RUN)
         return [self.folder / name for name in names]
+
+
+def new_folder(name: str) -> Path:
+    """A folder below results/ that is not there yet, named after the config and the time."""
+    stem = f"{name}-{datetime.datetime.now().strftime(STAMP)}"
+    numbered = (RESULTS / f"{stem}-{number}" for number in range(2, 1000))
+    return next(path for path in (RESULTS / stem, *numbered) if not path.exists())
+
+
+def newest_folder(name: str) -> Path:
+    """The folder below results/ of the last run of a config; raises FreepathError without one."""
+    stamped = re.compile(re.escape(name) + r"-[0-9]{8}-[0-9]{6}(-[0-9]+)?")
+    found = [path for path in RESULTS.glob("*/") if stamped.fullmatch(path.name)]
+    if not found:
+        raise FreepathError(f"no run of {name} in {RESULTS}/ to resume; name its folder with -o")
+    return max(found, key=lambda path: path.name)
 
 
 def _writer(file: Any, columns: tuple[str, ...]) -> csv.DictWriter:

@@ -49,18 +49,16 @@ def base_row(case: Case, device: DeviceInfo, run_id: str) -> dict[str, Any]:
     }
 
 
-def effects_of(case: Case, medium_kernel: str, along: Iterable[str] = ()) -> str:
+def composed_for(case: Case, medium_kernel: str, along: Iterable[str] = ()) -> str:
     """What the kernel of a case was composed for; `along` are the effects along its paths."""
-    effects = ["absorption"]
-    if case.light is not None:
-        effects += along
-    if medium_kernel != "homogeneous":
-        effects.append("heterogeneous")
-    if case.majorant and case.majorant.kind == "grid":
-        effects.append("majorant_grid")
-    if case.medium.channel_count > 1:
-        effects.append("chromatic")
-    return "+".join(effects)
+    parts = {
+        "absorption": True,
+        **dict.fromkeys(along if case.light else (), True),
+        "heterogeneous": medium_kernel != "homogeneous",
+        "majorant_grid": case.majorant and case.majorant.kind == "grid",
+        "chromatic": case.medium.channel_count > 1,
+    }
+    return "+".join(name for name, there in parts.items() if there)
 
 
 def measured_row(

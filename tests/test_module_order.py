@@ -28,8 +28,10 @@ ORDER = (
     ("results",),
     ("rows", "table", "binding", "confirm", "pictures"),
     ("equal_time", "report", "compare"),
+    ("jobs",),
+    ("run_file",),
     ("sweep",),
-    ("session", "arguments", "device_setup"),
+    ("arguments", "device_setup"),
     ("api", "check"),
     ("candidate", "recommend"),
     ("commands",),
@@ -139,5 +141,5 @@ def test_a_wrong_import_would_be_found(tmp_path):
     wrong = tmp_path / "errors.py"
     wrong.write_text("def f():\n    from freepath.device import Device\n")
     assert list(own_imports(wrong)) == [("device", 2)]
-    wrong.write_text("import freepath.cli\nfrom freepath import session, __version__\n")
-    assert list(own_imports(wrong)) == [("cli", 1), ("session", 2), ("__init__", 2)]
+    wrong.write_text("import freepath.cli\nfrom freepath import sweep, __version__\n")
+    assert list(own_imports(wrong)) == [("cli", 1), ("sweep", 2), ("__init__", 2)]

@@ -211,7 +211,8 @@ AXES = {
         Axis(
             "shadow",
             Tracker,
-            "The tracker that estimates the transmittance towards a point light; ratio if left out.",
+            "The tracker that estimates the transmittance towards a point light; "
+            "ratio if left out.",
             (),
             TrackerPattern,
             along_paths=True,

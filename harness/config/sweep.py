@@ -158,6 +158,11 @@ class Config(Model):
         return Path(self._document.name) if self._document else None
 
     @property
+    def search_path(self) -> list[Path]:
+        """Where volumes, rays and images are looked for first: beside the config."""
+        return [self.path.parent] if self.path else []
+
+    @property
     def text(self) -> str:
         """The text it was loaded from, comments included; '' for one made in a program."""
         return self._document.text if self._document else ""
