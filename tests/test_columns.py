@@ -33,23 +33,23 @@ def test_every_axis_has_a_column():
 def test_every_column_of_a_kind_has_one_type():
     for table in (columns.SAMPLES_TABLE, columns.CONFIRM_TABLE):
         for column in table:
-            assert (column.name in columns.TEXTS) == (column.type is str)
+            assert (column.name in columns.TEXTS) == (column.type == "str")
 
 
 AXIS = """
-        Axis(
-            "mood",
-            Annotated[str, Choice(("calm", "wild"))],
-            "A made-up axis.",
-            ("calm",),
-            usual="calm",
-            later=True,
-        ),
-    )
-}
-"""
-COLUMN = """    Column("mood", str, "", "made up"),
-    Column("params", str"""
+    Axis(
+        "mood",
+        Choice(("calm", "wild")),
+        ("calm",),
+        "A made-up axis.",
+        usual="calm",
+        later=True,
+    ),
+)
+AXES = """
+COLUMN = """
+mood str - made up
+params str"""
 CONFIG = """\
 name: x
 rays: {chords: {count: 16}}
@@ -68,8 +68,8 @@ def with_another_axis(tmp_path):
     for name in ("kernels", "configs"):
         shutil.copytree(ROOT / name, package / name)
     edits = (
-        ("config/axes.py", "\n    )\n}\n", AXIS),
-        ("columns.py", '    Column("params", str', COLUMN),
+        ("config/axes.py", "\n)\nAXES = ", AXIS),
+        ("columns.py", "\nparams str", COLUMN),
     )
     for name, old, new in edits:
         text = (package / name).read_text("utf-8")

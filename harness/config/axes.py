@@ -13,7 +13,7 @@ from freepath.config.base import Kind, OneOf
 from freepath.config.lights import LIGHTS, Uniform
 from freepath.config.models import MAJORANTS, MEDIA, Global
 from freepath.config.quantity import CountOr, Number, NumberOr
-from freepath.config.rules import Choice, OneOrMore
+from freepath.config.rules import Choice, OneOrMore, Rule
 
 ESTIMANDS = ("transmittance", "free_path", "radiance", "path_length", "mean_extinction")
 ALONG_PATHS = ("radiance", "path_length")
@@ -32,13 +32,11 @@ class Axis:
     """One axis; each value of it makes cases of its own."""
 
     name: str
-    value: Any
-    """The annotation of one value."""
-    meaning: str
+    rule: Rule
+    """What one value may be."""
     default: tuple[Any, ...] | None
     """Its values where a config has none; None where it must have some, () where it need not."""
-    pattern: Any = None
-    """The annotation of a value in exclude, if that is another."""
+    meaning: str
     usual: Any = ()
     """The value that names of cases do not mention."""
     later: bool = False
@@ -47,24 +45,25 @@ class Axis:
     """Whether it is of paths that scatter alone; its value is None elsewhere."""
     settled: Callable[[Any, Point], Any] = lambda value, point: value
     """One value for all that mean the same in a point, so that equal cases fall together."""
-    text: Callable[[Any], str] | None = None
-    """A value in the name of a case."""
+    prefix: str = ""
+    """Before a number in the name of a case."""
     column: str = ""
     """Of summary.csv; by the axis' own name if left out."""
     absent: str | None = "none"
     """What the column says for None."""
 
-    def values(self, value: Any = None, *, optional: bool = False) -> Any:
-        """The annotation of a list of values, or of one that stands for it."""
-        return Annotated[tuple[value or self.value, ...], OneOrMore(optional=optional)]
+    def values(self, *, pattern: bool = False, optional: bool = False) -> Any:
+        """The annotation of values, of which one may stand for a list; for exclude patterns."""
+        kinds = pattern and isinstance(self.rule, OneOf)
+        rule = OneOf(self.rule.word, self.rule.models, pattern=True) if kinds else self.rule
+        return Annotated[tuple[Annotated[Any, rule], ...], OneOrMore(optional=optional)]
 
     def part(self, value: Any) -> str:
         """What the name of a case says of a value; '' where it says nothing."""
         if value is None or value == self.usual:
             return ""
-        if self.text:
-            return self.text(value)
-        return short(value) if self.usual == () else f"{self.name}={short(value)}"
+        named = "" if self.usual == () else f"{self.name}="
+        return (self.prefix if value != AUTO else "") + named + short(value)
 
     def cell(self, value: Any) -> Any:
         """What the column says of a value."""
@@ -136,119 +135,93 @@ def name_of(point: Point) -> str:
 
 LAST = ("tracker", "lanes", "arithmetic")
 """The axes that end the name of a case."""
-Chance = NumberOr(Number("fraction", minimum=0, below=1), (AUTO, ANALOG))
-Tracker = Annotated[Kind, OneOf(TRACKER)]
-TrackerPattern = Annotated[Kind, OneOf(TRACKER, pattern=True)]
-
-
-AXES = {
-    axis.name: axis
-    for axis in (
-        Axis(
-            "estimand",
-            Annotated[str, Choice(ESTIMANDS)],
-            "What a case estimates.",
-            ("transmittance",),
-        ),
-        Axis(
-            "medium",
-            Annotated[Kind, OneOf("medium", MEDIA)],
-            "What the rays pass through.",
-            None,
-            Annotated[Kind, OneOf("medium", MEDIA, pattern=True)],
-        ),
-        Axis(
-            "majorant",
-            Annotated[Kind, OneOf("majorant", MAJORANTS)],
-            "Upper bounds of the extinction; trackers that need none ignore this axis.",
-            (Global(),),
-            Annotated[Kind, OneOf("majorant", MAJORANTS, pattern=True)],
-            settled=_if_bounded,
-        ),
-        Axis(
-            "tightness",
-            Annotated[float, Number(above=0)],
-            "Factor on the majorant: 1 is tight, below 1 it no longer bounds.",
-            (1.0,),
-            settled=_if_bounded,
-            text=lambda value: f"t{short(value)}",
-            absent=None,
-        ),
-        Axis(
-            "tracker",
-            Tracker,
-            "How distances are sampled or transmittance is estimated.",
-            None,
-            TrackerPattern,
-        ),
-        Axis(
-            "light",
-            Annotated[Kind, OneOf("light", LIGHTS)],
-            "What shines on the medium, of radiance.",
-            (Uniform(),),
-            Annotated[Kind, OneOf("light", LIGHTS, pattern=True)],
-            along_paths=True,
-        ),
-        Axis(
-            "scatterings",
-            Annotated[int | str, CountOr(UNLIMITED)],
-            "How often a path may scatter, of radiance; unlimited ends it by Russian roulette.",
-            (UNLIMITED,),
-            along_paths=True,
-            text=lambda value: f"s{value}",
-        ),
-        Axis(
-            "p_absorb",
-            Annotated[float | str, Chance],
-            "The chance that a path is absorbed at a collision, of radiance: analog is\n"
-            "1 - albedo; auto is 0 for bounded scatterings, and else Russian roulette by weight.",
-            (AUTO,),
-            usual=AUTO,
-            later=True,
-            along_paths=True,
-            settled=_if_scattering,
-        ),
-        Axis(
-            "shadow",
-            Tracker,
-            "The tracker that estimates the transmittance towards a point light; "
-            "ratio if left out.",
-            (),
-            TrackerPattern,
-            along_paths=True,
-            settled=_if_lit,
-        ),
-        Axis(
-            "effects",
-            Annotated[str, Choice(("auto", "all"))],
-            "auto compiles what the scene has; all compiles everything, for comparison.",
-            ("auto",),
-            usual="auto",
-            along_paths=True,
-            column="composition",
-            absent="auto",
-        ),
-        Axis(
-            "lanes",
-            Annotated[int | str, Choice(("auto", 1, 2, 4, 8, 16))],
-            "Paths that a work-item follows at once; auto is the device's vector width.",
-            ("auto",),
-            text=lambda value: value if value == "auto" else f"l{value}",
-        ),
-        Axis(
-            "arithmetic",
-            Annotated[str, Choice(("strict", "fast", "double"))],
-            "strict float, fast (-cl-fast-relaxed-math) or double.",
-            ("strict",),
-        ),
-        Axis(
-            "storage",
-            Annotated[str, Choice(("float", "half"))],
-            "How the voxels of a grid are stored: float or half; other media ignore this axis.",
-            ("float",),
-            usual="float",
-            later=True,
-            settled=_if_voxels,
-        ),
-    )
-}
+_LIST = (
+    Axis("estimand", Choice(ESTIMANDS), ("transmittance",), "What a case estimates."),
+    Axis("medium", OneOf("medium", MEDIA), None, "What the rays pass through."),
+    Axis(
+        "majorant",
+        OneOf("majorant", MAJORANTS),
+        (Global(),),
+        "Upper bounds of the extinction; trackers that need none ignore this axis.",
+        settled=_if_bounded,
+    ),
+    Axis(
+        "tightness",
+        Number(above=0),
+        (1.0,),
+        "Factor on the majorant: 1 is tight, below 1 it no longer bounds.",
+        settled=_if_bounded,
+        prefix="t",
+        absent=None,
+    ),
+    Axis(
+        "tracker", OneOf(TRACKER), None, "How distances are sampled or transmittance is estimated."
+    ),
+    Axis(
+        "light",
+        OneOf("light", LIGHTS),
+        (Uniform(),),
+        "What shines on the medium, of radiance.",
+        along_paths=True,
+    ),
+    Axis(
+        "scatterings",
+        CountOr(UNLIMITED),
+        (UNLIMITED,),
+        "How often a path may scatter, of radiance; unlimited ends it by Russian roulette.",
+        along_paths=True,
+        prefix="s",
+    ),
+    Axis(
+        "p_absorb",
+        NumberOr(Number("fraction", minimum=0, below=1), (AUTO, ANALOG)),
+        (AUTO,),
+        "The chance that a path is absorbed at a collision, of radiance: analog is\n"
+        "1 - albedo; auto is 0 for bounded scatterings, and else Russian roulette by weight.",
+        usual=AUTO,
+        later=True,
+        along_paths=True,
+        settled=_if_scattering,
+    ),
+    Axis(
+        "shadow",
+        OneOf(TRACKER),
+        (),
+        "The tracker that estimates the transmittance towards a point light; ratio if left out.",
+        along_paths=True,
+        settled=_if_lit,
+    ),
+    Axis(
+        "effects",
+        Choice((AUTO, "all")),
+        (AUTO,),
+        "auto compiles what the scene has; all compiles everything, for comparison.",
+        usual=AUTO,
+        along_paths=True,
+        column="composition",
+        absent=AUTO,
+    ),
+    Axis(
+        "lanes",
+        Choice((AUTO, 1, 2, 4, 8, 16)),
+        (AUTO,),
+        "Paths that a work-item follows at once; auto is the device's vector width.",
+        prefix="l",
+    ),
+    Axis(
+        "arithmetic",
+        Choice(("strict", "fast", "double")),
+        ("strict",),
+        "strict float, fast (-cl-fast-relaxed-math) or double.",
+    ),
+    Axis(
+        "storage",
+        Choice(("float", "half")),
+        ("float",),
+        "How the voxels of a grid are stored: float or half; other media ignore this axis.",
+        usual="float",
+        later=True,
+        settled=_if_voxels,
+    ),
+)
+AXES = {axis.name: axis for axis in _LIST}

@@ -70,7 +70,7 @@ Exclude = create_model(
     __doc__="""Cases of the matrix to remove: those that match each of these axes.
 
 A bare kind matches whatever its parameters, a mapping the parameters that it gives.""",
-    **{axis.name: (axis.values(axis.pattern), Field(None)) for axis in AXES.values()},
+    **{axis.name: (axis.values(pattern=True), Field(None)) for axis in AXES.values()},
 )
 
 
