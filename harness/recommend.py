@@ -15,6 +15,7 @@ from freepath import api, plan
 from freepath.catalog import ANY, Catalog
 from freepath.device import Device
 from freepath.errors import NothingMatchedError, RunError
+from freepath.ladder import Ladder
 from freepath.scene.volumes import read_volume
 from freepath.sweep import Clock, Listener
 from freepath.table import number, uncertainty
@@ -197,16 +198,14 @@ class Search:
 def needed(row: dict[str, str], accuracy: float) -> tuple[float, float] | None:
     """Device seconds a ray to a relative RMSE, and half their 95 % interval relative to them.
 
-    RMSE(t)^2 = bias^2 + variance x time_per_sample / t, solved for t: infinite where the bias alone
-    is larger. None where the row does not tell.
+    Infinite where the bias alone is larger. None where the row does not say.
     """
     variance, scale = number(row, "variance"), number(row, "reference")
     scale = number(row, "estimate") if scale is None else scale
     time = number(row, "time_per_sample_s")
     if variance is None or not scale or not time:
         return None
-    room = (accuracy * scale) ** 2 - (number(row, "bias_rms") or 0.0) ** 2
-    needs = time * max(1.0, variance / room) if room > 0 else math.inf
+    needs = Ladder(number(row, "bias_rms") or 0.0, variance, time).time_to(accuracy * scale)
     noises = number(row, "time_noise"), number(row, "variance_noise")
     return needs, uncertainty(needs, time, *noises)
 

@@ -10,7 +10,7 @@ FOLDER = Path(freepath.__file__).parent
 # Each line may import those above it and none of its own or below.
 ORDER = (
     ("version",),
-    ("__init__", "errors", "environment", "columns"),
+    ("__init__", "errors", "environment", "columns", "ladder"),
     ("config",),
     ("kernel_files",),
     ("catalog",),
@@ -43,7 +43,7 @@ LONGEST = 300
 ONLY_CSV = {
     "table": {"errors"},
     # the pictures of a run are files beside its CSV
-    "report": {"errors", "results", "table", "report", "version", "pictures"},
+    "report": {"errors", "ladder", "results", "table", "report", "version", "pictures"},
     "compare": {"errors", "results", "table", "compare"},
     "results": {"errors", "journal", "columns"},
     "journal": {"errors"},

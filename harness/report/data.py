@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from freepath.errors import FreepathError
+from freepath.ladder import Ladder
 from freepath.results import CHECKS, CONFIRM, CONFIRM_COLUMNS, RUN, SUMMARY, read_rows
 from freepath.table import ROUGH, Row, along, bounces, lit, number, tracker_label, uncertainty
 
@@ -207,7 +208,7 @@ def _span(rows: list[dict[str, Any]]) -> None:
     if not rows:
         return
     starts = [row["t"] for row in rows]
-    met = max(row["t"] * row["v"] / DEEPEST**2 for row in rows)
+    met = max(Ladder(0.0, row["v"], row["t"]).time_to(DEEPEST) for row in rows)
     low = min(starts)
     high = max(2 * max(starts), min(LONGEST * low, met))
     for row in rows:
