@@ -41,6 +41,7 @@ device str - its name
 platform str - the name of the device's platform
 driver_version str - of the device
 tracker str - its name; its parameters are in `params`
+tracker_label str - its name with the parameters that are not their defaults
 estimand str - what the case estimates
 medium str - its kind with what differs from its defaults
 channels int - of the medium

@@ -16,7 +16,7 @@ from freepath.columns import COLUMNS, CONFIRM_COLUMNS, SAMPLE_COLUMNS, TEXTS
 from freepath.errors import FreepathError
 from freepath.journal import Journal
 
-SCHEMA_VERSION = 4
+SCHEMA_VERSION = 5
 SUMMARY, SAMPLES, CONFIRM, RUN = "summary.csv", "samples.csv", "confirm.csv", "run.json"
 CHECKS = "checks.json"
 """What became of the checks of a tracker on trial."""

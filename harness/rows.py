@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from freepath.catalog import Tracker
 from freepath.columns import COLUMNS, TEXTS
-from freepath.config.axes import AXES
+from freepath.config.axes import AXES, label
 from freepath.device import DeviceInfo
 from freepath.measure import Measurement
 from freepath.plan import Case
@@ -42,6 +42,7 @@ def base_row(case: Case, device: DeviceInfo, run_id: str) -> dict[str, Any]:
         "platform": device.platform,
         "driver_version": device.driver_version,
         "tracker": case.tracker,
+        "tracker_label": label(case.point["tracker"]),
         "channels": case.medium.channel_count,
         "params": json.dumps(dict(case.params), sort_keys=True),
         "seed": case.seed,

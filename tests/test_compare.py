@@ -21,7 +21,7 @@ SETTINGS = compare.Settings()
 
 def row_of(name, **changes):
     row = dict.fromkeys(COLUMNS, "") | {
-        "schema_version": "4",
+        "schema_version": "5",
         "run_id": "r",
         "case_id": name,
         "case": f"transmittance/m/{name}/auto/strict",
@@ -231,7 +231,7 @@ def test_what_should_not_be_compared_is_refused(tmp_path, runs, capsys):
     assert "expected the folder of a run" in capsys.readouterr().err
     (b / "summary.csv").write_text("a,b\n")
     assert main(["compare", str(a), str(b)]) == 2
-    assert "schema version 4" in capsys.readouterr().err
+    assert "schema version 5" in capsys.readouterr().err
     assert main(["compare", str(a), str(a), "-o", "x.pdf"]) == 2
 
 

@@ -225,7 +225,7 @@ def test_a_missing_line_end_does_not_join_rows(tmp_path):
 
 def test_files_of_another_version_are_refused(tmp_path):
     (tmp_path / SUMMARY).write_text("a,b\n1,2\n")
-    with pytest.raises(FreepathError, match="its columns are not those of schema version 4"):
+    with pytest.raises(FreepathError, match="its columns are not those of schema version 5"):
         resumed(tmp_path)
 
 

@@ -83,7 +83,6 @@ class Number(Rule):
     below: float | None = None
 
     def check(self, value: Any, context: Any) -> float | int:
-        """Return the number in base units: an int for a count, else a float."""
         number = convert(value, self.unit) if isinstance(value, str) else value
         if isinstance(number, bool) or not isinstance(number, (int, float)):
             raise expected(self.describe(), value, self._hint(value))
@@ -113,7 +112,6 @@ class Number(Rule):
         return ""
 
     def describe(self) -> str:
-        """Return for instance "a length > 0, such as 20 or 20 m"."""
         unit = UNITS[self.unit]
         example = f", such as {unit.example}" if unit.example else ""
         return unit.noun + self._range() + example
@@ -126,7 +124,6 @@ class Number(Rule):
         return " " + " and ".join(bounds) if bounds else ""
 
     def json_schema(self) -> dict[str, Any]:
-        """Return a number schema, or text with a unit; what the unit is, a pattern cannot say."""
         bounds = {
             "minimum": self.minimum,
             "exclusiveMinimum": self.above,
@@ -159,7 +156,6 @@ class CountOr(Rule):
     word: str
 
     def check(self, value: Any, context: Any) -> int | str:
-        """Return the number or the word."""
         if value == self.word and isinstance(value, str):
             return value
         number = value if not isinstance(value, float) or not value.is_integer() else int(value)
@@ -168,11 +164,9 @@ class CountOr(Rule):
         return number
 
     def describe(self) -> str:
-        """Return what it may be."""
         return f"an integer >= 0 or {self.word}"
 
     def json_schema(self) -> dict[str, Any]:
-        """Return the schema of either."""
         return {"anyOf": [Number("count", minimum=0).json_schema(), {"const": self.word}]}
 
 
@@ -184,7 +178,6 @@ class NumberOr(Rule):
     words: tuple[str, ...]
 
     def check(self, value: Any, context: Any) -> float | int | str:
-        """Return the number in base units, or the word."""
         if isinstance(value, str) and value in self.words:
             return value
         try:
@@ -194,9 +187,7 @@ class NumberOr(Rule):
             raise expected(self.describe(), value, hint) from None
 
     def describe(self) -> str:
-        """Return what it may be."""
         return " or ".join([", ".join(self.words), self.number.describe()])
 
     def json_schema(self) -> dict[str, Any]:
-        """Return the schema of either."""
         return {"anyOf": [self.number.json_schema(), {"enum": list(self.words)}]}
