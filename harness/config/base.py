@@ -194,6 +194,7 @@ class OneOf(Rule):
         return self.word + ("_pattern" if self.pattern else "")
 
     def json_schema(self) -> dict[str, Any]:
+        # freepath.config.schema replaces this mark by a reference
         return {"kind_definition": self.definition}
 
     def definition_schema(self, models: dict[str, type[Kind]]) -> dict[str, Any]:

@@ -83,6 +83,7 @@ class Number(Rule):
     below: float | None = None
 
     def check(self, value: Any, context: Any) -> float | int:
+        """Return the number in base units: an int for a count, else a float."""
         number = convert(value, self.unit) if isinstance(value, str) else value
         if isinstance(number, bool) or not isinstance(number, (int, float)):
             raise expected(self.describe(), value, self._hint(value))
@@ -112,6 +113,7 @@ class Number(Rule):
         return ""
 
     def describe(self) -> str:
+        """Return for instance "a length > 0, such as 20 or 20 m"."""
         unit = UNITS[self.unit]
         example = f", such as {unit.example}" if unit.example else ""
         return unit.noun + self._range() + example
@@ -124,6 +126,7 @@ class Number(Rule):
         return " " + " and ".join(bounds) if bounds else ""
 
     def json_schema(self) -> dict[str, Any]:
+        """Return a number schema, or text with a unit; what the unit is, a pattern cannot say."""
         bounds = {
             "minimum": self.minimum,
             "exclusiveMinimum": self.above,
