@@ -109,25 +109,23 @@ def expand(config: Config, catalog: Catalog) -> list[Case]:
     if not matrix["shadow"]:
         default = catalog.trackers.get(SHADOW)
         matrix["shadow"] = (default.model() if default else None,)
-    _refuse_too_many(config, matrix)
+    included = [matrix | _included_axes(entry, config) for entry in config.include]
+    count = sum(math.prod(map(len, axes.values())) for axes in (matrix, *included))
+    if count > MOST_CASES:
+        message = f"expected at most {MOST_CASES} cases, got {count}"
+        raise ConfigError([config.problem(("matrix",), message)])
     refuse_elsewhere(config)
     points = _excluded(config, _points(matrix))
-    for entry in config.include:
-        points |= _points({**matrix, **_included_axes(entry, config)})
+    for axes in included:
+        points |= _points(axes)
     if not points:
         raise NothingMatchedError("no case: exclude removes every case of the matrix")
-    cases = [_case(i, point, config, catalog) for i, point in enumerate(points.values(), 1)]
+    cases = []
+    for index, point in enumerate(points.values(), 1):
+        reason = skip_reason(catalog.trackers[point["tracker"].kind], point, catalog)
+        run = config.rays, config.seed, config.stop
+        cases.append(Case(index, name_of(point), point, *run, reason))
     return _named_apart(cases)
-
-
-def _refuse_too_many(config: Config, matrix: dict[str, tuple[Any, ...]]) -> None:
-    sizes = [math.prod(len(values) for values in matrix.values())]
-    for entry in config.include:
-        axes = {**matrix, **_included_axes(entry, config)}
-        sizes.append(math.prod(len(values) for values in axes.values()))
-    if sum(sizes) > MOST_CASES:
-        message = f"expected at most {MOST_CASES} cases, got {sum(sizes)}"
-        raise ConfigError([config.problem(("matrix",), message)])
 
 
 def _included_axes(entry: Include, config: Config) -> dict[str, tuple[Any, ...]]:
@@ -171,12 +169,6 @@ def _equals(value: Any, wanted: Any) -> bool:
     if isinstance(value, Kind) and isinstance(wanted, Kind):
         return value.matches(wanted)
     return value == wanted
-
-
-def _case(index: int, point: Point, config: Config, catalog: Catalog) -> Case:
-    tracker = catalog.trackers[point["tracker"].kind]
-    reason = skip_reason(tracker, point, catalog)
-    return Case(index, name_of(point), point, config.rays, config.seed, config.stop, reason)
 
 
 def _named_apart(cases: list[Case]) -> list[Case]:
