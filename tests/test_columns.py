@@ -101,6 +101,10 @@ def test_a_new_axis_is_an_edit_in_two_files(with_another_axis, tmp_path, selecto
         found = {(row["tracker"], row["mood"]): row for row in csv.DictReader(file)}
     wanted = {(t, m) for t in ("delta", "ratio") for m in ("calm", "wild")} | {("regular", "calm")}
     assert set(found) == wanted
+    for column in columns.SUMMARY_TABLE:
+        for row in found.values():
+            # a cell that is not of its column's type is a ValueError
+            {"str": str, "int": int, "float": float}[column.type](row[column.name] or 0)
     calm, wild = found["delta", "calm"], found["delta", "wild"]
     assert calm["case"] == "transmittance/homogeneous-1/global/t1/delta/auto/strict"
     assert wild["case"] == "transmittance/homogeneous-1/global/t1/mood=wild/delta/auto/strict"

@@ -95,6 +95,7 @@ class Text(Rule):
     pattern: str = ""
 
     def check(self, value: Any, context: Any) -> str:
+        """Return the text; a number or a truth value is none."""
         if not isinstance(value, str) or not value.strip():
             raise expected(self.what, value)
         if self.pattern and not re.fullmatch(self.pattern, value):
@@ -102,9 +103,11 @@ class Text(Rule):
         return value
 
     def describe(self) -> str:
+        """Return what the text is."""
         return self.what
 
     def json_schema(self) -> dict[str, Any]:
+        """Return a string schema."""
         return {"type": "string", "pattern": f"^{self.pattern}$" if self.pattern else r"\S"}
 
 
