@@ -32,6 +32,7 @@ lint: $(VENV)/installed-for-tests
 
 schema: $(VENV)/installed
 	$(BIN)/python -m freepath.catalog configs/schema.json
+	$(BIN)/python -m freepath.columns docs/notation.md
 
 # Debian's python3 has venv only with the package python3-venv, whose installation takes root;
 # virtualenv does the same from the package index.

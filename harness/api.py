@@ -2,13 +2,53 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from freepath.errors import RunError
 from freepath.results import SUMMARY, ResultFolder, read_rows, records
+
+if TYPE_CHECKING:
+    from freepath.catalog import Catalog
+    from freepath.config import Config
+    from freepath.device import Device
+    from freepath.plan import Case
+    from freepath.selection import Parts
+    from freepath.sweep import Sweep
+
+
+def sweep(  # noqa: PLR0913 (what a sweep is made of; most has a default)
+    config: str | Path | Config,
+    output: str | Path | None = None,
+    *,
+    devices: Sequence[Device],
+    axes: Sequence[str] = (),
+    known: Catalog | None = None,
+    cases: list[Case] | None = None,
+    resume: bool = False,
+    confirm: bool = False,
+    **more: Any,
+) -> Sweep:
+    """Make a sweep, whose `run()` measures it.
+
+    `config` is a path, the name of a config that ships, or one that is loaded; `output` the folder
+    for the results (default: results/NAME-TIME, with `resume` the newest of these). `devices` are
+    open; `axes` are what -a takes. `known` are the trackers (default: the
+    shipped ones), `cases` those of the config that are wanted (default: all). A `listener` and a
+    `clock` may be given. Raises FreepathError with the message that the command line prints.
+    """
+    from freepath import catalog, plan, results
+    from freepath import config as configs
+    from freepath.sweep import Sweep
+
+    known = known or catalog.load()
+    if isinstance(config, (str, Path)):
+        config = configs.load(configs.find(str(config)), known.parameter_models(), list(axes))
+    cases = cases or plan.expand(config, known)
+    path = output or (results.newest_folder if resume else results.new_folder)(config.name)
+    folder = ResultFolder(Path(path), resume=resume, confirm=confirm)
+    return Sweep(config, known, cases, list(devices), folder, confirm=confirm, **more)
 
 
 def run(
@@ -26,39 +66,47 @@ def run(
     done; True prints a line a case. Returns what `load` does. Raises FreepathError with the message
     that the command line prints, and KeyboardInterrupt with what was measured left in the folder.
     """
-    from freepath import catalog, drivers, plan, selection, session
+    from freepath import selection
+    from freepath.sweep import Listener
+
+    listener = Listener()
+    if progress is True:
+        listener.row = _say
+    elif callable(progress):
+        listener.progress = progress
+    parts = selection.checked(selection.resolve(list(devices)))
+    if not selection.can_be_here(parts):
+        return load(_run_elsewhere(config, output, parts, axes, quiet=progress is not True))
+    opened = selection.opened(parts)
+    prepared = sweep(config, output, devices=opened, axes=axes, listener=listener)
+    prepared.run()
+    return load(prepared.folder.folder)
+
+
+def _run_elsewhere(
+    config: str | Path, output: str | Path | None, parts: Parts, axes: Sequence[str], *, quiet: bool
+) -> Path:
+    """Run a config on drivers that this process cannot see, each in its own; returns the folder."""
+    from freepath import catalog, drivers, results, selection
     from freepath import config as configs
 
-    clock = session.Clock(time.perf_counter())
-    known = catalog.load([])
-    loaded = configs.load(configs.find(str(config)), known.parameter_models(), list(axes))
-    cases = plan.select(plan.expand(loaded, known), None, None)
-    parts = selection.checked(selection.resolve(list(devices)))
-    folder = ResultFolder(Path(output) if output else session.new_folder(loaded.name))
-    if not selection.can_be_here(parts):
-        for part in parts:
-            chosen = [word for info in part.infos for word in ("-d", selection.selector_of(info))]
-            chosen += [word for axis in axes for word in ("-a", axis)]
-            command = ["run", str(loaded.path), "-o", str(folder.folder), "--rows-only", *chosen]
-            command += ["--resume"] * folder.holds_rows
-            ended = drivers.in_process_of(part.driver, command, capture=progress is not True)
-            if part.failure or ended.returncode:
-                why = part.failure or drivers.how_it_ended(part.driver, ended.returncode)
-                raise RunError(f"{why}\n{ended.stderr or ''}".strip())
-        return load(folder.folder)
-    opened = selection.opened(parts)
-    on_done = _say if progress is True else _ignore
-    on_progress = progress if callable(progress) else _ignore
-    session.Run(loaded, known, cases, folder, clock, on_done, on_progress).execute(opened)
-    return load(folder.folder)
+    path = configs.find(str(config))
+    loaded = configs.load(path, catalog.load().parameter_models(), list(axes))
+    folder = ResultFolder(Path(output or results.new_folder(loaded.name)))
+    for driver, infos, failure in parts:
+        command = ["run", str(path), "-o", str(folder.folder), "--rows-only"]
+        command += [word for info in infos for word in ("-d", selection.selector_of(info))]
+        command += [word for axis in axes for word in ("-a", axis)]
+        command += ["--resume"] * folder.holds_rows
+        ended = None if failure else drivers.in_process_of(driver, command, capture=quiet)
+        if failure or ended.returncode:
+            why = failure or drivers.how_it_ended(driver, ended.returncode)
+            raise RunError("\n".join(filter(None, (why, ended and ended.stderr))))
+    return folder.folder
 
 
 def _say(row: dict[str, Any]) -> None:
     print(f"{row['status']:>8}  {row['case']}")
-
-
-def _ignore(*_: Any) -> None:
-    pass
 
 
 def load(result: str | Path) -> Any:

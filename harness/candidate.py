@@ -12,8 +12,6 @@ from pathlib import Path
 from typing import Any
 
 from freepath import catalog as catalogs
-from freepath import config as configs
-from freepath import plan, session
 from freepath.catalog import Catalog, Tracker
 from freepath.check import registry
 from freepath.check import session as checking
@@ -25,7 +23,7 @@ from freepath.check.verdict import NotApplicable
 from freepath.device import Device, DeviceInfo
 from freepath.errors import CatalogError
 from freepath.report.data import Report, known_to
-from freepath.results import CHECKS, ResultFolder
+from freepath.results import CHECKS
 from freepath.table import seconds
 
 RELATIVES = 4
@@ -155,20 +153,6 @@ def sweep_text(tracker: Tracker, others: Sequence[Tracker], volume: dict[str, An
         f"stop: {json.dumps(STOP)}",
     ]
     return "\n".join(lines) + "\n"
-
-
-def sweep(
-    config: Path,
-    known: Catalog,
-    device: Device,
-    folder: ResultFolder,
-    told: tuple[Callable[..., None], Callable[..., None]],
-    clock: session.Clock,
-) -> None:
-    """Run the sweep into the folder."""
-    loaded = configs.load(config, known.parameter_models())
-    cases = plan.expand(loaded, known)
-    session.Run(loaded, known, cases, folder, clock, *told).execute([device])
 
 
 def failed(outcomes: Sequence[Outcome]) -> list[Outcome]:

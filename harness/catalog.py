@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
 
+from freepath.config.axes import ESTIMANDS
 from freepath.config.base import Kind, Model
 from freepath.config.document import Document
 from freepath.config.loading import read_text
@@ -19,7 +20,6 @@ from freepath.config.models import MAJORANTS
 from freepath.config.quantity import UNITS, Number
 from freepath.config.rules import Choice, Flag, OneOrMore, Rule, Text, expected, failure
 from freepath.config.schema import json_schema
-from freepath.config.sweep import ESTIMANDS
 from freepath.errors import CatalogError, ConfigError, Problem
 from freepath.kernel_files import split_front_matter
 from pydantic import ValidationInfo, create_model, field_validator
@@ -283,7 +283,7 @@ def _parameter_model(name: str, front: FrontMatter) -> type[Kind]:
         for key, parameter in front.parameters.items()
     }
     model = create_model(name, __base__=Kind, __doc__=front.title, **fields)
-    model.kind = name
+    model.kind, model.NEEDS = name, frozenset(front.needs)
     return model
 
 

@@ -20,6 +20,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from freepath.ladder import Ladder
 from freepath.measure import UNITS_PER_LANE, Bench, shape_of
 from freepath.runner import SAMPLES_PER_UNIT, Round, Runner
 from freepath.stats import relative_half_width
@@ -91,8 +92,8 @@ def predicted(row: dict[str, Any], time_s: float) -> float | None:
     """The RMSE that a case's row predicts for so many device seconds a ray; None if unknown."""
     if row["time_to_1pct_s"] is None:
         return None
-    variance = row["variance"] * row["time_per_sample_s"] / time_s
-    return math.sqrt(row["bias_rms"] ** 2 + variance)
+    ladder = Ladder(row["bias_rms"], row["variance"], row["time_per_sample_s"])
+    return ladder.rmse_after(time_s)
 
 
 def confirmed_rows(row: dict[str, Any], bench: Bench, reference: np.ndarray) -> list[dict]:

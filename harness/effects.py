@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from freepath import kernel_files
-from freepath.config.sweep import AUTO, UNLIMITED
+from freepath.config.axes import AUTO, UNLIMITED
 from freepath.kernel_files import KernelFile
 from freepath.path_axes import chance_of_absorption
 

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from freepath.errors import FreepathError
+from freepath.ladder import Ladder
 from freepath.measure import Bench, shape_of
 from freepath.pictures import (
     EQUAL_TIME,
@@ -58,8 +59,9 @@ def seconds_of(rows: Sequence[dict[str, Any]]) -> float:
 
 def _visible(row: dict[str, Any]) -> float:
     scale = row["estimate"] if row["reference"] is None else row["reference"]
-    needed = row["variance"] / (VISIBLE * scale) ** 2 if scale else 0.0
-    return row["time_per_sample_s"] * min(needed, SHARE * row["samples_per_ray"])
+    per_sample = row["time_per_sample_s"]
+    visible = Ladder(0.0, row["variance"], per_sample).time_to(VISIBLE * scale) if scale else 0.0
+    return min(visible, SHARE * row["samples_per_ray"] * per_sample)
 
 
 def render(folder: Path, shots: Sequence[Shot], rows: Sequence[Row] = ()) -> list[str]:

@@ -1,32 +1,16 @@
-"""The axes of paths that scatter: what they mean, and where they mean nothing or are refused."""
+"""The axis p_absorb: what it means, and where it is refused."""
 
 from __future__ import annotations
 
 from typing import Any
 
+from freepath.config.axes import ALONG_PATHS, ANALOG, AUTO
 from freepath.config.document import Location
-from freepath.config.sweep import ALONG_PATHS, ANALOG, AUTO, Config
+from freepath.config.sweep import Config
 from freepath.errors import ConfigError, Problem
 
-PATH_AXES = ("light", "scatterings", "p_absorb", "shadow", "effects")
 GRAIN = 2.0**-24
 """Of the uniform numbers of a kernel."""
-
-
-def scatters(point: dict[str, Any]) -> bool:
-    """Whether a path of a point of the matrix may scatter."""
-    return any(point["medium"].albedo) and point["scatterings"] != 0
-
-
-def settle(point: dict[str, Any]) -> None:
-    """Set what says nothing in a point to one value, so that equal cases fall together."""
-    if point["estimand"] not in ALONG_PATHS:
-        point |= dict.fromkeys(PATH_AXES)
-        return
-    if "position" not in type(point["light"]).model_fields and point["effects"] == "auto":
-        point["shadow"] = None
-    if not scatters(point):
-        point["p_absorb"] = AUTO
 
 
 def refuse_elsewhere(config: Config) -> None:

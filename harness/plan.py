@@ -14,10 +14,11 @@ from typing import Any
 
 from freepath.applicable import skip_reason
 from freepath.catalog import Catalog
+from freepath.config.axes import AXES, Point, name_of, settle
 from freepath.config.base import Kind
-from freepath.config.sweep import AUTO, AXES, Config, Exclude, Include, Stop
+from freepath.config.sweep import Config, Exclude, Include, Stop
 from freepath.errors import ConfigError, NothingMatchedError, Problem
-from freepath.path_axes import refuse_elsewhere, settle
+from freepath.path_axes import refuse_elsewhere
 
 MOST_CASES = 100_000
 ID_LENGTH = 12
@@ -27,66 +28,52 @@ SHADOW = "ratio"
 
 @dataclasses.dataclass(frozen=True)
 class Case:
-    """One combination: what is measured, and with what.
+    """One combination: what is measured, and with what. Each axis is an attribute of its name.
 
-    `majorant` and `tightness` are None for a tracker that uses no majorant. `params` are complete.
-    `skip_reason` says why the combination cannot work; it is '' for one that can.
-    `index` counts from 1. `sigma_t` and lengths are in the config's units (see config.quantity).
+    `majorant` and `tightness` are None for a tracker that uses no majorant, the axes of paths that
+    scatter for other estimands, `shadow` also without a point light. `sigma_t` and lengths are in
+    the config's units (see config.quantity). `index` counts from 1.
     """
 
     index: int
     name: str
-    estimand: str
-    medium: Kind
-    majorant: Kind | None
-    tightness: float | None
-    tracker: str
-    params: Mapping[str, float | int | str] = dataclasses.field(hash=False)
-    lanes: int | str
-    arithmetic: str
-    storage: str
-    """How the voxels of a grid are stored; float of media that have none."""
+    point: Mapping[str, Any] = dataclasses.field(hash=False)
+    """The value of each axis."""
     rays: Kind
     seed: int
     stop: Stop
     skip_reason: str
-    light: Kind | None = None
-    scatterings: int | str | None = None
-    p_absorb: float | str | None = None
-    shadow: Kind | None = None
-    effects: str | None = None
-    """These five are of paths that scatter, None for other estimands; `shadow` is None without a
-    point light."""
+    """Why the combination cannot work; '' for one that can."""
+
+    def __getattr__(self, axis: str) -> Any:
+        try:
+            return self.__dict__["point"][axis]
+        except KeyError:
+            raise AttributeError(axis) from None
+
+    @property
+    def tracker(self) -> str:
+        """The name of the tracker."""
+        return self.point["tracker"].kind
+
+    @property
+    def params(self) -> dict[str, float | int | str]:
+        """All parameters of the tracker."""
+        return self.point["tracker"].parameters()
 
     def identity(self) -> dict[str, Any]:
         """Return everything that defines the case but its place and the device, fit for JSON."""
-        paths = {} if self.light is None else self._of_paths()
-        # what was always float is known by the same identity as when there was nothing else
-        stored = {} if self.storage == "float" else {"storage": self.storage}
+        named = {}
+        for name, axis in AXES.items():
+            value = self.point[name]
+            outside = axis.along_paths and self.light is None
+            if not (outside or (axis.later and value == axis.usual)):
+                named[name] = value.as_dict() if isinstance(value, Kind) else value
         return {
-            **paths,
-            **stored,
-            "estimand": self.estimand,
-            "medium": self.medium.as_dict(),
-            "majorant": self.majorant.as_dict() if self.majorant else None,
-            "tightness": self.tightness,
-            "tracker": {self.tracker: dict(self.params)},
-            "lanes": self.lanes,
-            "arithmetic": self.arithmetic,
+            **named,
             "rays": self.rays.as_dict(),
             "seed": self.seed,
             "stop": self.stop.model_dump(mode="json"),
-        }
-
-    def _of_paths(self) -> dict[str, Any]:
-        # as with storage
-        absorbed = {} if self.p_absorb == AUTO else {"p_absorb": self.p_absorb}
-        return {
-            **absorbed,
-            "light": self.light.as_dict(),
-            "scatterings": self.scatterings,
-            "shadow": self.shadow.as_dict() if self.shadow else None,
-            "effects": self.effects,
         }
 
     @property
@@ -122,25 +109,23 @@ def expand(config: Config, catalog: Catalog) -> list[Case]:
     if not matrix["shadow"]:
         default = catalog.trackers.get(SHADOW)
         matrix["shadow"] = (default.model() if default else None,)
-    _refuse_too_many(config, matrix)
+    included = [matrix | _included_axes(entry, config) for entry in config.include]
+    count = sum(math.prod(map(len, axes.values())) for axes in (matrix, *included))
+    if count > MOST_CASES:
+        message = f"expected at most {MOST_CASES} cases, got {count}"
+        raise ConfigError([config.problem(("matrix",), message)])
     refuse_elsewhere(config)
-    points = _excluded(config, _points(matrix, catalog))
-    for entry in config.include:
-        points |= _points({**matrix, **_included_axes(entry, config)}, catalog)
+    points = _excluded(config, _points(matrix))
+    for axes in included:
+        points |= _points(axes)
     if not points:
         raise NothingMatchedError("no case: exclude removes every case of the matrix")
-    cases = [_case(i, point, config, catalog) for i, point in enumerate(points.values(), 1)]
+    cases = []
+    for index, point in enumerate(points.values(), 1):
+        reason = skip_reason(catalog.trackers[point["tracker"].kind], point, catalog)
+        run = config.rays, config.seed, config.stop
+        cases.append(Case(index, name_of(point), point, *run, reason))
     return _named_apart(cases)
-
-
-def _refuse_too_many(config: Config, matrix: dict[str, tuple[Any, ...]]) -> None:
-    sizes = [math.prod(len(values) for values in matrix.values())]
-    for entry in config.include:
-        axes = {**matrix, **_included_axes(entry, config)}
-        sizes.append(math.prod(len(values) for values in axes.values()))
-    if sum(sizes) > MOST_CASES:
-        message = f"expected at most {MOST_CASES} cases, got {sum(sizes)}"
-        raise ConfigError([config.problem(("matrix",), message)])
 
 
 def _included_axes(entry: Include, config: Config) -> dict[str, tuple[Any, ...]]:
@@ -148,20 +133,12 @@ def _included_axes(entry: Include, config: Config) -> dict[str, tuple[Any, ...]]
     return {axis: values for axis, values in entry.axes().items() if axis not in config.overridden}
 
 
-Point = dict[str, Any]
-
-
-def _points(axes: dict[str, tuple[Any, ...]], catalog: Catalog) -> dict[tuple[Any, ...], Point]:
+def _points(axes: dict[str, tuple[Any, ...]]) -> dict[tuple[Any, ...], Point]:
     """Return the product of the axes, keyed so that equal points fall together."""
     points = {}
     for values in itertools.product(*(axes[axis] for axis in AXES)):
         point = dict(zip(AXES, values, strict=True))
         settle(point)
-        trackers = [kind for kind in (point["tracker"], point["shadow"]) if kind]
-        if not any("majorant" in catalog.trackers[kind.kind].needs for kind in trackers):
-            point["majorant"] = point["tightness"] = None
-        if not point["medium"].VOXELS:
-            point["storage"] = "float"
         points[tuple(point.values())] = point
     return points
 
@@ -192,64 +169,6 @@ def _equals(value: Any, wanted: Any) -> bool:
     if isinstance(value, Kind) and isinstance(wanted, Kind):
         return value.matches(wanted)
     return value == wanted
-
-
-def _case(index: int, point: Point, config: Config, catalog: Catalog) -> Case:
-    tracker = catalog.trackers[point["tracker"].kind]
-    return Case(
-        index=index,
-        name=_name(point),
-        tracker=tracker.name,
-        params=point["tracker"].parameters(),
-        rays=config.rays,
-        seed=config.seed,
-        stop=config.stop,
-        skip_reason=skip_reason(tracker, point, catalog),
-        **{axis: point[axis] for axis in AXES if axis != "tracker"},
-    )
-
-
-def _name(point: Point) -> str:
-    parts = [point["estimand"], label(point["medium"])]
-    if point["majorant"]:
-        parts += [label(point["majorant"]), f"t{_short(point['tightness'])}"]
-    if point["light"]:
-        parts += [label(point["light"]), f"s{point['scatterings']}"]
-        absorbed = point["p_absorb"]
-        parts += [] if absorbed == AUTO else [f"p_absorb={_short(absorbed)}"]
-        parts += [label(point["shadow"])] if point["shadow"] else []
-        parts += ["effects=all"] if point["effects"] == "all" else []
-    parts += [] if point["storage"] == "float" else [f"storage={point['storage']}"]
-    lanes = point["lanes"]
-    parts += [label(point["tracker"]), lanes if lanes == "auto" else f"l{lanes}"]
-    return "/".join([*parts, point["arithmetic"]])
-
-
-def label(kind: Kind) -> str:
-    """Return a kind with what it must be given, then whatever else differs from its default.
-
-    For instance "cloud-128-200" or "cloud-128-200-seed=2"; sigma_t needs no name either.
-    """
-    parts = [kind.kind]
-    fields = type(kind).model_fields.items()
-    for name, field in sorted(fields, key=lambda item: not item[1].is_required()):
-        value = getattr(kind, name)
-        if field.is_required():
-            parts.append(_short(value))
-        elif value != field.default:
-            parts.append(_short(value) if name == "sigma_t" else f"{name}={_short(value)}")
-    return "-".join(parts)
-
-
-def _short(value: Any) -> str:
-    if isinstance(value, tuple):
-        if len(set(value)) == 1:
-            return _short(value[0])
-        return "x".join(_short(item) for item in value)
-    if isinstance(value, float):
-        return f"{value:g}" if float(f"{value:g}") == value else repr(value)
-    # a file is known by its name without folders; spaces and the like would need quoting in -R
-    return re.sub(r"[^\w.+=-]", "_", re.split(r"[/\\]", str(value))[-1])
 
 
 def _named_apart(cases: list[Case]) -> list[Case]:

@@ -11,13 +11,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from freepath import config as configs
-from freepath import plan, session
+from freepath import api, plan
 from freepath.catalog import ANY, Catalog
 from freepath.device import Device
 from freepath.errors import NothingMatchedError, RunError
-from freepath.results import ResultFolder
+from freepath.ladder import Ladder
 from freepath.scene.volumes import read_volume
+from freepath.sweep import Clock, Listener
 from freepath.table import number, uncertainty
 from scipy import stats
 
@@ -68,8 +68,8 @@ class Search:
     """Relative RMSE."""
     budget_s: float
     """Seconds of measuring, over all rounds; compilation comes on top."""
-    told: tuple[Callable[..., None], Callable[..., None]]
-    clock: session.Clock
+    listener: Listener
+    clock: Clock
     only: str = ""
     """A regular expression that names of trackers match."""
     measured: int = 0
@@ -141,22 +141,30 @@ class Search:
         stop = PRECISION[turn] | {"at_most": f"{seconds:.3g} s"}
         config = self.folder / f"round-{turn + 1}.yaml"
         config.write_text(self.config_text(points, stop), "utf-8")
-        loaded = configs.load(config, self.known.parameter_models())
-        cases = plan.expand(loaded, self.known)
-        results = ResultFolder(self.folder / f"round-{turn + 1}")
-        run = session.Run(loaded, self.known, cases, results, self.clock, *self.told)
-        run.execute([self.device])
-        by_id = {case.case_id: case for case in cases}
-        rows = [row for row in results.rows() if row["status"] == "ok"]
+        rows, by_id = self.measure(config)
+        rows = [row for row in rows if row["status"] == "ok"]
         self.measured += len(rows)
         found = [self._finding(by_id[row["case_id"]], row) for row in rows]
         reaching = [one for one in found if one and math.isfinite(one.time_s)]
         if not reaching:
             raise RunError(
                 f"no case reaches a relative error of {100 * self.accuracy:g} %: the transmittance "
-                f"is 0, or biases are larger; see {results.folder}"
+                f"is 0, or biases are larger; see {config.with_suffix('')}"
             )
         return reaching
+
+    def measure(self, config: Path) -> tuple[list[dict[str, str]], dict[str, plan.Case]]:
+        """Run a config into the folder beside it: its rows, and its cases by their ids."""
+        sweep = api.sweep(
+            config,
+            config.with_suffix(""),
+            known=self.known,
+            devices=[self.device],
+            listener=self.listener,
+            clock=self.clock,
+        )
+        sweep.run()
+        return sweep.folder.rows(), {case.case_id: case for case in sweep.cases}
 
     def _finding(self, case: plan.Case, row: dict[str, str]) -> Finding | None:
         found = needed(row, self.accuracy)
@@ -190,16 +198,14 @@ class Search:
 def needed(row: dict[str, str], accuracy: float) -> tuple[float, float] | None:
     """Device seconds a ray to a relative RMSE, and half their 95 % interval relative to them.
 
-    RMSE(t)^2 = bias^2 + variance x time_per_sample / t, solved for t: infinite where the bias alone
-    is larger. None where the row does not tell.
+    Infinite where the bias alone is larger. None where the row does not say.
     """
     variance, scale = number(row, "variance"), number(row, "reference")
     scale = number(row, "estimate") if scale is None else scale
     time = number(row, "time_per_sample_s")
     if variance is None or not scale or not time:
         return None
-    room = (accuracy * scale) ** 2 - (number(row, "bias_rms") or 0.0) ** 2
-    needs = time * max(1.0, variance / room) if room > 0 else math.inf
+    needs = Ladder(number(row, "bias_rms") or 0.0, variance, time).time_to(accuracy * scale)
     noises = number(row, "time_noise"), number(row, "variance_noise")
     return needs, uncertainty(needs, time, *noises)
 

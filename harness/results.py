@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import csv
+import datetime
 import json
 import math
 import os
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from freepath.columns import COLUMNS, CONFIRM_COLUMNS, SAMPLE_COLUMNS, TEXTS
 from freepath.errors import FreepathError
 from freepath.journal import Journal
 
@@ -18,43 +21,8 @@ SUMMARY, SAMPLES, CONFIRM, RUN = "summary.csv", "samples.csv", "confirm.csv", "r
 CHECKS = "checks.json"
 """What became of the checks of a tracker on trial."""
 LOCK = ".lock"
-# fmt: off
-COLUMNS = (
-    "schema_version", "run_id", "case_id", "case", "status", "reason",
-    "device", "platform", "driver_version",
-    "tracker", "estimand", "medium", "channels", "majorant", "tightness", "effects",
-    "light", "scatterings", "p_absorb", "shadow", "composition",
-    "arithmetic", "storage", "lanes", "work_items", "work_group", "params", "seed",
-    "rays", "samples_per_ray", "rounds", "stopped",
-    "lookups_per_sample", "crossings_per_sample", "steps_per_sample", "lane_occupancy",
-    "time_per_sample_s", "time_per_sample_cv", "time_noise", "timing_source",
-    "time_device_s", "time_wall_s", "device_time_share", "time_build_s",
-    "source_bytes", "binary_bytes", "private_bytes", "lookups_per_s",
-    "estimate", "reference", "bias", "bias_stderr", "bias_rms", "z_score",
-    "variance", "variance_noise", "rmse",
-    "inv_efficiency_lookups", "inv_efficiency_s",
-    "time_to_10pct_s", "time_to_1pct_s", "time_to_0.1pct_s",
-    "truncated", "nonfinite", "violations", "counted_samples",
-    "source_sha256", "config_sha256",
-)
-SAMPLE_COLUMNS = (
-    "schema_version", "run_id", "case_id", "device", "platform", "round",
-    "samples", "first_sample_of_ray", "time_device_s", "time_wall_s", "iterations",
-    "estimate", "variance",
-)
-CONFIRM_COLUMNS = (
-    "schema_version", "run_id", "case_id", "case", "device", "platform",
-    "estimand", "medium", "tracker", "reference", "rays", "samples_per_ray", "repeats",
-    "time_s", "drift", "rmse_predicted", "rmse_measured", "rmse_low", "rmse_high",
-)
-TEXTS = frozenset((
-    "run_id", "case_id", "case", "status", "reason", "device", "platform", "driver_version",
-    "tracker", "estimand", "medium", "majorant", "effects", "light", "scatterings", "p_absorb",
-    "shadow", "composition", "arithmetic", "storage", "params", "stopped",
-    "timing_source", "source_sha256", "config_sha256",
-))
-# fmt: on
-"""Columns that are no numbers, even where they look like one: a case_id may be 123456789012."""
+RESULTS = Path("results")
+STAMP = "%Y%m%d-%H%M%S"
 PLACE = ("case_id", "device", "platform")
 """What a row is about: a later row of the same place takes its place."""
 KEY = (*PLACE, "driver_version", "config_sha256", "source_sha256")
@@ -230,6 +198,22 @@ class ResultFolder:
         """The files of the run."""
         names = (SUMMARY, SAMPLES, *([CONFIRM] if self._confirm else []), RUN)
         return [self.folder / name for name in names]
+
+
+def new_folder(name: str) -> Path:
+    """A folder below results/ that is not there yet, named after the config and the time."""
+    stem = f"{name}-{datetime.datetime.now().strftime(STAMP)}"
+    numbered = (RESULTS / f"{stem}-{number}" for number in range(2, 1000))
+    return next(path for path in (RESULTS / stem, *numbered) if not path.exists())
+
+
+def newest_folder(name: str) -> Path:
+    """The folder below results/ of the last run of a config; raises FreepathError without one."""
+    stamped = re.compile(re.escape(name) + r"-[0-9]{8}-[0-9]{6}(-[0-9]+)?")
+    found = [path for path in RESULTS.glob("*/") if stamped.fullmatch(path.name)]
+    if not found:
+        raise FreepathError(f"no run of {name} in {RESULTS}/ to resume; name its folder with -o")
+    return max(found, key=lambda path: path.name)
 
 
 def _writer(file: Any, columns: tuple[str, ...]) -> csv.DictWriter:

@@ -9,10 +9,12 @@ from typing import Any
 
 import numpy as np
 from freepath.catalog import Tracker
+from freepath.columns import COLUMNS, TEXTS
+from freepath.config.axes import AXES, label
 from freepath.device import DeviceInfo
 from freepath.measure import Measurement
-from freepath.plan import Case, label
-from freepath.results import COLUMNS, SCHEMA_VERSION
+from freepath.plan import Case
+from freepath.results import SCHEMA_VERSION
 from freepath.stats import Accuracy, accuracy, relative_half_width
 
 ROUNDING = {"strict": 1e-3, "fast": 1e-3, "double": 1e-9}
@@ -24,6 +26,11 @@ LADDER = {"time_to_10pct_s": 0.1, "time_to_1pct_s": 0.01, "time_to_0.1pct_s": 0.
 def base_row(case: Case, device: DeviceInfo, run_id: str) -> dict[str, Any]:
     """What is known of a row before anything ran; all other columns are empty."""
     row: dict[str, Any] = dict.fromkeys(COLUMNS)
+    for name, axis in AXES.items():
+        value = axis.cell(case.point[name])
+        row[axis.column or name] = str(value) if (axis.column or name) in TEXTS else value
+    if case.lanes == "auto":
+        row["lanes"] = device.lanes
     return row | {
         "schema_version": SCHEMA_VERSION,
         "run_id": run_id,
@@ -35,37 +42,24 @@ def base_row(case: Case, device: DeviceInfo, run_id: str) -> dict[str, Any]:
         "platform": device.platform,
         "driver_version": device.driver_version,
         "tracker": case.tracker,
-        "estimand": case.estimand,
-        "medium": label(case.medium),
+        "tracker_label": label(case.point["tracker"]),
         "channels": case.medium.channel_count,
-        "majorant": label(case.majorant) if case.majorant else "none",
-        "tightness": case.tightness,
-        "light": label(case.light) if case.light else "none",
-        "scatterings": "none" if case.light is None else str(case.scatterings),
-        "p_absorb": "none" if case.light is None else str(case.p_absorb),
-        "shadow": label(case.shadow) if case.shadow else "none",
-        "composition": case.effects or "auto",
-        "arithmetic": case.arithmetic,
-        "storage": case.storage,
-        "lanes": device.lanes if case.lanes == "auto" else case.lanes,
         "params": json.dumps(dict(case.params), sort_keys=True),
         "seed": case.seed,
         "source_sha256": "",
     }
 
 
-def effects_of(case: Case, medium_kernel: str, along: Iterable[str] = ()) -> str:
+def composed_for(case: Case, medium_kernel: str, along: Iterable[str] = ()) -> str:
     """What the kernel of a case was composed for; `along` are the effects along its paths."""
-    effects = ["absorption"]
-    if case.light is not None:
-        effects += along
-    if medium_kernel != "homogeneous":
-        effects.append("heterogeneous")
-    if case.majorant and case.majorant.kind == "grid":
-        effects.append("majorant_grid")
-    if case.medium.channel_count > 1:
-        effects.append("chromatic")
-    return "+".join(effects)
+    parts = {
+        "absorption": True,
+        **dict.fromkeys(along if case.light else (), True),
+        "heterogeneous": medium_kernel != "homogeneous",
+        "majorant_grid": case.majorant and case.majorant.kind == "grid",
+        "chromatic": case.medium.channel_count > 1,
+    }
+    return "+".join(name for name, there in parts.items() if there)
 
 
 def measured_row(

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from freepath.ladder import Ladder
 from scipy import special
 
 CONFIDENCE = 0.95
@@ -136,17 +137,14 @@ class Accuracy:
     def time_to(self, relative_error: float, time_per_sample: float) -> float | None:
         """Device seconds a ray until the relative RMSE falls to an error; inf if it never does.
 
-        Solves RMSE(t)^2 = bias^2 + variance * time_per_sample / t; one sample is the least. None
-        where the variance is unknown. Where the reference is, the error is that of the estimate,
-        taken to be unbiased.
+        None where the variance is unknown. Where the reference is, the error is that of the
+        estimate, taken to be unbiased.
         """
         if self.unseen:
             return None
         scale = self.estimate if self.reference is None else self.reference
-        room = (relative_error * scale) ** 2 - (self.bias_rms or 0.0) ** 2
-        if self.variance == 0:
-            return time_per_sample if room >= 0 else math.inf
-        return time_per_sample * max(1.0, self.variance / room) if room > 0 else math.inf
+        ladder = Ladder(self.bias_rms or 0.0, self.variance, time_per_sample)
+        return ladder.time_to(relative_error * scale)
 
 
 def accuracy(moments: Moments, reference: np.ndarray | None) -> Accuracy:

@@ -79,14 +79,6 @@ def skipped(rows: Iterable[Row]) -> dict[str, int]:
     return Counter(row["reason"] for row in rows if row["status"] == "skipped")
 
 
-def tracker_label(row: Row) -> str:
-    """The tracker with its parameters that are not their defaults, from the name of the case.
-
-    That name is estimand/medium[/majorant/tightness]/tracker/lanes/arithmetic.
-    """
-    return row["case"].split("/")[-3]
-
-
 def uncertainty(
     time: float, per_sample: float, time_noise: float | None, variance_noise: float | None
 ) -> float:
@@ -149,7 +141,7 @@ def bias(row: Row) -> str:
 
 def _method(row: Row) -> str:
     """Tracker, majorant and tightness."""
-    parts = [tracker_label(row)]
+    parts = [row["tracker_label"]]
     if row["majorant"] != "none":
         parts.append(f"{row['majorant']} x{number(row, 'tightness'):g}")
     return " ".join([*parts, *along(row)])

@@ -10,7 +10,7 @@ FOLDER = Path(freepath.__file__).parent
 # Each line may import those above it and none of its own or below.
 ORDER = (
     ("version",),
-    ("__init__", "errors", "environment"),
+    ("__init__", "errors", "environment", "columns", "ladder"),
     ("config",),
     ("kernel_files",),
     ("catalog",),
@@ -30,8 +30,10 @@ ORDER = (
     ("results",),
     ("rows", "table", "binding", "confirm", "pictures"),
     ("equal_time", "report", "compare"),
+    ("jobs",),
+    ("run_file",),
     ("sweep",),
-    ("session", "arguments", "device_setup"),
+    ("arguments", "device_setup"),
     ("api", "check"),
     ("candidate", "recommend"),
     ("commands",),
@@ -43,9 +45,9 @@ LONGEST = 330
 ONLY_CSV = {
     "table": {"errors"},
     # the pictures of a run are files beside its CSV
-    "report": {"errors", "results", "table", "report", "version", "pictures"},
+    "report": {"errors", "ladder", "results", "table", "report", "version", "pictures"},
     "compare": {"errors", "results", "table", "compare"},
-    "results": {"errors", "journal"},
+    "results": {"errors", "journal", "columns"},
     "journal": {"errors"},
 }
 """What modules may import that work on rows of CSV and on nothing else."""
@@ -141,5 +143,5 @@ def test_a_wrong_import_would_be_found(tmp_path):
     wrong = tmp_path / "errors.py"
     wrong.write_text("def f():\n    from freepath.device import Device\n")
     assert list(own_imports(wrong)) == [("device", 2)]
-    wrong.write_text("import freepath.cli\nfrom freepath import session, __version__\n")
-    assert list(own_imports(wrong)) == [("cli", 1), ("session", 2), ("__init__", 2)]
+    wrong.write_text("import freepath.cli\nfrom freepath import sweep, __version__\n")
+    assert list(own_imports(wrong)) == [("cli", 1), ("sweep", 2), ("__init__", 2)]

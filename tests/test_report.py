@@ -29,6 +29,7 @@ ROW = dict.fromkeys(COLUMNS, "") | {
     "majorant": "global",
     "tightness": "1.0",
     "tracker": "delta",
+    "tracker_label": "delta",
     "arithmetic": "strict",
     "lanes": "16",
     "rays": "64",
@@ -50,7 +51,7 @@ ROW = dict.fromkeys(COLUMNS, "") | {
 
 def row_of(number, tracker, tightness=1.0, seconds=1e-6, **changes):
     case = f"transmittance/cloud-64/global/t{tightness:g}/{tracker}/auto/strict"
-    row = ROW | {"case_id": str(number), "case": case, "tracker": tracker}
+    row = ROW | {"case_id": str(number), "case": case, "tracker": tracker, "tracker_label": tracker}
     row |= {"tightness": str(tightness), "time_per_sample_s": str(seconds)}
     return row | {"time_to_1pct_s": str(1e4 * seconds)} | changes
 

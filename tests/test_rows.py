@@ -101,10 +101,10 @@ def test_a_skipped_row_has_a_reason_and_no_numbers(case):
 
 
 def test_effects_are_those_that_were_composed(case):
-    assert rows.effects_of(case(), "homogeneous") == "absorption"
-    assert rows.effects_of(case(), "grid_trilinear") == "absorption+heterogeneous"
+    assert rows.composed_for(case(), "homogeneous") == "absorption"
+    assert rows.composed_for(case(), "grid_trilinear") == "absorption+heterogeneous"
     grid = case(majorant="{grid: {resolution: 4}}")
-    assert rows.effects_of(grid, "grid_nearest") == "absorption+heterogeneous+majorant_grid"
+    assert rows.composed_for(grid, "grid_nearest") == "absorption+heterogeneous+majorant_grid"
 
 
 def test_costs(base):

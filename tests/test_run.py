@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from freepath import catalog, cli, config, plan, session, source
-from freepath.results import COLUMNS, SAMPLE_COLUMNS, ResultFolder, read_rows
-from freepath.sweep import Sweep
+from freepath import api, catalog, cli, results, source, sweep
+from freepath.results import COLUMNS, SAMPLE_COLUMNS, read_rows
+from freepath.sweep import Listener, Sweep
 
 SWEEP = """\
 name: small
@@ -107,24 +107,15 @@ def test_what_run_json_tells(go, device):
 
 def test_rows_are_on_the_disk_as_each_case_ends(work, device):
     (work / "small.yaml").write_text(SWEEP)
-    known = catalog.load()
-    loaded = config.load("small.yaml", known.parameter_models())
     seen = []
 
-    def on_done(row):
-        with open("out/summary.csv", newline="") as file:
-            seen.append([line["case_id"] for line in csv.DictReader(file)])
-        assert seen[-1][-1] == row["case_id"]
+    class Looking(Listener):
+        def row(self, row):
+            with open("out/summary.csv", newline="") as file:
+                seen.append([line["case_id"] for line in csv.DictReader(file)])
+            assert seen[-1][-1] == row["case_id"]
 
-    session.Run(
-        loaded,
-        known,
-        plan.expand(loaded, known),
-        ResultFolder(work / "out"),
-        session.Clock(0.0),
-        on_done,
-        lambda done, total, what: None,
-    ).execute([device])
+    api.sweep("small.yaml", "out", devices=[device], listener=Looking()).run()
     assert [len(ids) for ids in seen] == [1, 2, 3, 4]
 
 
@@ -149,7 +140,7 @@ class Interrupted(Sweep):
 
 
 def test_an_interrupted_run_is_completed(go, work, monkeypatch):
-    monkeypatch.setattr(session, "Sweep", Interrupted)
+    monkeypatch.setattr(sweep, "Sweep", Interrupted)
     code, printed = go()
     assert code == 130
     assert "interrupted with 1 of 4 cases done; go on with the same command" in printed.err
@@ -322,23 +313,23 @@ def test_estimates_are_the_same_for_the_same_seed(go, work):
 
 
 def test_folders_are_named_after_config_and_time(work):
-    first = session.new_folder("small")
+    first = results.new_folder("small")
     assert re.fullmatch(r"small-\d{8}-\d{6}", first.name)
     for name in ("small-20200101-000000", "small-20210101-000000", "small-2-20220101-000000"):
         (work / "results" / name).mkdir(parents=True)
     (work / "results" / "small-notes").mkdir()
-    assert session.newest_folder("small").name == "small-20210101-000000"
-    assert session.newest_folder("small-2").name == "small-2-20220101-000000"
-    with pytest.raises(session.FreepathError, match="no run of other in results/ to resume"):
-        session.newest_folder("other")
+    assert results.newest_folder("small").name == "small-20210101-000000"
+    assert results.newest_folder("small-2").name == "small-2-20220101-000000"
+    with pytest.raises(results.FreepathError, match="no run of other in results/ to resume"):
+        results.newest_folder("other")
 
 
 def test_two_runs_in_a_second_have_two_folders(work, monkeypatch):
-    monkeypatch.setattr(session, "STAMP", "20200101-000000")
+    monkeypatch.setattr(results, "STAMP", "20200101-000000")
     names = []
     for _ in range(3):
-        folder = session.new_folder("small")
+        folder = results.new_folder("small")
         folder.mkdir(parents=True)
         names.append(folder.name)
     assert names == ["small-20200101-000000", "small-20200101-000000-2", "small-20200101-000000-3"]
-    assert session.newest_folder("small").name == names[-1]
+    assert results.newest_folder("small").name == names[-1]

@@ -20,6 +20,7 @@ def row_of(case="transmittance/cloud-64-50/global/t1/delta/auto/strict", **given
         "estimand": estimand,
         "medium": medium,
         "tracker": tracker.split("-")[0],
+        "tracker_label": tracker,
         "majorant": "global" if "/t" in case else "none",
         "tightness": "1.0" if "/t" in case else "",
         "lanes": "16",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import re
-import time
 from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -96,22 +95,24 @@ def _expression(text: str) -> str:
 
 def execute(options: Namespace) -> int:
     """Run it; returns the exit code."""
-    from freepath import catalog, recommend, session
+    from freepath import catalog, recommend
     from freepath.commands.common import console_of, volume_of
     from freepath.commands.run import _shown_progress
     from freepath.errors import UsageError
+    from freepath.results import new_folder
     from freepath.selection import one_device
+    from freepath.sweep import Clock
 
-    clock = session.Clock(time.perf_counter())
+    clock = Clock()
     medium = {"volume": volume_of(options.volume, options.sigma_t, options.grid)}
     known = catalog.load(options.trackers)
-    folder = options.output or session.new_folder(f"recommend-{options.volume.stem}")
+    folder = options.output or new_folder(f"recommend-{options.volume.stem}")
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise UsageError(f"{folder}: expected a folder that is empty or not there yet")
     device = one_device(options.device)
     console = console_of()
     told = {"highlight": False, "markup": False, "soft_wrap": True}
-    with _shown_progress(console) as (_, on_progress):
+    with _shown_progress(console, rows=False) as listener:
         search = recommend.Search(
             known,
             device,
@@ -120,7 +121,7 @@ def execute(options: Namespace) -> int:
             options.estimand,
             options.accuracy,
             options.budget,
-            (lambda row: None, on_progress),
+            listener,
             clock,
             options.include,
         )

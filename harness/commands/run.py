@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from freepath.plan import Case
     from freepath.results import ResultFolder
     from freepath.selection import Parts
-    from freepath.session import Run
+    from freepath.sweep import Listener, Sweep
     from rich.console import Console
 
 NAMED = 3
@@ -84,33 +84,39 @@ def execute(options: Namespace) -> int:
     loaded, known, cases = cases_of(options)
     if options.show_only:
         return _show_only(options, cases)
-    from freepath import environment, selection, session
+    from freepath import api, environment, results, selection
+    from freepath.sweep import Clock
 
     load = environment.load()
     parts = selection.checked(selection.resolve(options.device))
-    here = selection.can_be_here(parts)
-    devices = selection.opened(parts) if here else []
-    path = options.output or (session.newest_folder if options.resume else session.new_folder)(
-        loaded.name
-    )
-    folder = _folder(path, options)
-    if not here:
+    if not selection.can_be_here(parts):
+        found = results.newest_folder if options.resume else results.new_folder
+        path = options.output or found(loaded.name)
+        folder = results.ResultFolder(path, resume=options.resume, confirm=options.confirm)
         failed = _run_in_processes(options, parts, folder, cases)
         shown = _show(options, folder, cases, load) if folder.holds_rows else 0
         return max(shown, failed)
     console = console_of(stderr=options.json)
-    with _shown_progress(console) as (on_done, on_progress):
-        clock, told = session.Clock(started), (on_done, on_progress)
-        sweep = session.Run(loaded, known, cases, folder, clock, *told, options.confirm)
-        sweep.work_group = options.work_group
+    sweep = api.sweep(
+        loaded,
+        options.output,
+        devices=selection.opened(parts),
+        known=known,
+        cases=cases,
+        resume=options.resume,
+        confirm=options.confirm,
+        clock=Clock(started),
+        work_group=options.work_group,
+    )
+    with _shown_progress(console) as sweep.listener:
         try:
-            sweep.execute(devices)
+            sweep.run()
         except KeyboardInterrupt:
             _say_how_to_resume(sweep)
             return INTERRUPTED
     if options.rows_only:
         return 0
-    return _show(options, folder, cases, load, sweep)
+    return _show(options, sweep.folder, cases, load, sweep)
 
 
 def _run_in_processes(
@@ -181,7 +187,7 @@ def _show(
     folder: ResultFolder,
     cases: list[Case],
     load: float,
-    sweep: Run | None = None,
+    sweep: Sweep | None = None,
 ) -> int:
     """Print what the folder holds, and what failed; returns the exit code."""
     from freepath import table
@@ -202,15 +208,10 @@ def _show(
     return _say_failures(rows)
 
 
-def _folder(path: Path, options: Namespace) -> ResultFolder:
-    from freepath.results import ResultFolder
-
-    return ResultFolder(path, resume=options.resume, confirm=options.confirm)
-
-
 @contextmanager
-def _shown_progress(console: Console) -> Iterator[tuple[Any, Any]]:
-    """A bar on a terminal, a line a case elsewhere; gives what Run tells rows and progress to."""
+def _shown_progress(console: Console, *, rows: bool = True) -> Iterator[Listener]:
+    """A bar on a terminal; elsewhere a line a case, if `rows`."""
+    from freepath.sweep import Listener
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
     from rich.progress import TimeRemainingColumn as Remaining
 
@@ -227,18 +228,19 @@ def _shown_progress(console: Console) -> Iterator[tuple[Any, Any]]:
     ) as bar:
         task = bar.add_task("", total=0)
 
-        def on_done(row: dict[str, Any]) -> None:
-            if not console.is_terminal:
-                line = f"{row['status']:>8}  {row['case']}"
-                console.print(line, highlight=False, markup=False, soft_wrap=True)
+        class Shown(Listener):
+            def row(self, row: dict[str, Any]) -> None:
+                if rows and not console.is_terminal:
+                    line = f"{row['status']:>8}  {row['case']}"
+                    console.print(line, highlight=False, markup=False, soft_wrap=True)
 
-        def on_progress(done: float, total: int, what: str) -> None:
-            bar.update(task, completed=done, total=total, description=what)
+            def progress(self, done: float, total: int, what: str) -> None:
+                bar.update(task, completed=done, total=total, description=what)
 
-        yield on_done, on_progress
+        yield Shown()
 
 
-def _say_how_to_resume(sweep: Run) -> None:
+def _say_how_to_resume(sweep: Sweep) -> None:
     done = f"interrupted with {sweep.ended} of {sweep.total} cases done"
     path = sweep.folder.folder
     if sweep.folder.is_open:
@@ -283,7 +285,7 @@ def _print_tables(console: Console, rows: list[dict[str, str]], load: float) -> 
     console.print(f"\n{table.LEGEND}\n", highlight=False)
 
 
-def _print_times(console: Console, sweep: Run) -> None:
+def _print_times(console: Console, sweep: Sweep) -> None:
     if not sweep.total:
         console.print("nothing was left to run")
         return

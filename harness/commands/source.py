@@ -31,7 +31,7 @@ def execute(options: Namespace) -> int:
     """Run it; returns the exit code."""
     loaded, known, cases = cases_of(options)
     case = _chosen(options, cases)
-    from freepath import binding, session, source
+    from freepath import binding, source
     from freepath.scene import build_medium
     from freepath.selection import one_device
 
@@ -39,7 +39,7 @@ def execute(options: Namespace) -> int:
         print(f"freepath: {case.name} has no source: {case.skip_reason}", file=sys.stderr)
         return USAGE
     device = one_device(options.device)
-    medium = build_medium(case.medium, session.search_path(loaded))
+    medium = build_medium(case.medium, loaded.search_path)
     structure = binding.structure_of(case, known, medium, device, count=False)
     print(source.compose(structure).text)
     return 0

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import time
 from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,7 +15,6 @@ if TYPE_CHECKING:
     from freepath.catalog import Catalog, Tracker
     from freepath.check.outcome import Outcome
     from freepath.device import Device
-    from freepath.results import ResultFolder
     from rich.console import Console
 
 
@@ -64,16 +62,15 @@ def add(commands: Any) -> None:
 
 def execute(options: Namespace) -> int:
     """Run it; returns the exit code."""
-    from freepath import candidate, session
+    from freepath import candidate
     from freepath.commands.common import console_of, volume_of
-    from freepath.results import ResultFolder
+    from freepath.results import ResultFolder, new_folder
     from freepath.selection import one_device
 
-    clock = session.Clock(time.perf_counter())
     known, tracker = candidate.read(options.tracker)
     volume = volume_of(options.volume, options.sigma_t) if options.volume else None
-    path = options.output or session.new_folder(f"try-{tracker.name}")
-    folder = ResultFolder(path)
+    path = options.output or new_folder(f"try-{tracker.name}")
+    ResultFolder(path)  # refuses one that holds a run
     device = one_device(options.device)
     console = console_of()
     console.print(f"{tracker.title}, on {device.info.label}", highlight=False, markup=False)
@@ -87,7 +84,7 @@ def execute(options: Namespace) -> int:
     config.write_text(
         candidate.sweep_text(tracker, candidate.relatives(known, tracker), volume), "utf-8"
     )
-    return _measure(console, config, (known, tracker), device, folder, clock)
+    return _measure(console, config, (known, tracker), device)
 
 
 def _check(
@@ -133,17 +130,17 @@ def _measure(
     config: Path,
     trackers: tuple[Catalog, Tracker],
     device: Device,
-    folder: ResultFolder,
-    clock: Any,
 ) -> int:
     """Measure it beside its relatives, write the report and say where it pays."""
-    from freepath import candidate, report, table
+    from freepath import api, candidate, report, table
     from freepath.commands.run import _shown_progress
     from freepath.report.text import summary
 
     known, tracker = trackers
-    with _shown_progress(console) as told:
-        candidate.sweep(config, known, device, folder, told, clock)
+    with _shown_progress(console) as listener:
+        sweep = api.sweep(config, config.parent, known=known, devices=[device], listener=listener)
+        sweep.run()
+    folder = sweep.folder
     found, page = report.write([folder.folder], None, "html")
     console.print("", summary(found), "")
     told = {"highlight": False, "markup": False, "soft_wrap": True}

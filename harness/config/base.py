@@ -89,6 +89,8 @@ class Kind(Model):
     """One kind of medium, majorant, tracker or rays with its parameters."""
 
     kind: ClassVar[str] = ""
+    NEEDS: ClassVar[frozenset[str]] = frozenset()
+    """What a tracker takes beside the extinction at a point; of other kinds nothing."""
 
     @model_serializer(mode="wrap")
     def _as_written(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
@@ -147,7 +149,6 @@ class OneOf(Rule):
         self.pattern = pattern
 
     def check(self, value: Any, context: Any) -> Kind:
-        """Return the model of the kind, or raise for an unknown one or for its parameters."""
         models = (context or {}).get(self.word, {}) if self.models is None else self.models
         name, parameters = self._split(value, models)
         model = pattern_of(models[name]) if self.pattern else models[name]
@@ -185,7 +186,6 @@ class OneOf(Rule):
         return f"{self._noun} ({one_of(models)})" if models else self._noun
 
     def describe(self) -> str:
-        """Return the names, as far as they are known without a context."""
         return self._describe(self.models)
 
     @property
@@ -194,7 +194,7 @@ class OneOf(Rule):
         return self.word + ("_pattern" if self.pattern else "")
 
     def json_schema(self) -> dict[str, Any]:
-        """Return a mark that freepath.config.schema replaces by a reference to `definition`."""
+        # freepath.config.schema replaces this mark by a reference
         return {"kind_definition": self.definition}
 
     def definition_schema(self, models: dict[str, type[Kind]]) -> dict[str, Any]:

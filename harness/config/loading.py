@@ -8,10 +8,11 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from freepath.config.axes import TRACKER
 from freepath.config.base import Kind
 from freepath.config.document import Document, Location, validate
 from freepath.config.overrides import Override, parse_all
-from freepath.config.sweep import TRACKER, Config
+from freepath.config.sweep import Config
 from freepath.errors import ConfigError, Problem, did_you_mean
 
 # no config comes near this; a volume given by mistake is far over it, and parsing it would hang

@@ -6,8 +6,8 @@ import dataclasses
 from collections.abc import Iterable
 from typing import Any
 
+from freepath.config.axes import AXES
 from freepath.config.document import Document, Location, path_text
-from freepath.config.sweep import AXES
 from freepath.errors import ConfigError, Problem, did_you_mean
 
 

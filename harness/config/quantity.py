@@ -159,7 +159,6 @@ class CountOr(Rule):
     word: str
 
     def check(self, value: Any, context: Any) -> int | str:
-        """Return the number or the word."""
         if value == self.word and isinstance(value, str):
             return value
         number = value if not isinstance(value, float) or not value.is_integer() else int(value)
@@ -168,11 +167,9 @@ class CountOr(Rule):
         return number
 
     def describe(self) -> str:
-        """Return what it may be."""
         return f"an integer >= 0 or {self.word}"
 
     def json_schema(self) -> dict[str, Any]:
-        """Return the schema of either."""
         return {"anyOf": [Number("count", minimum=0).json_schema(), {"const": self.word}]}
 
 
@@ -184,7 +181,6 @@ class NumberOr(Rule):
     words: tuple[str, ...]
 
     def check(self, value: Any, context: Any) -> float | int | str:
-        """Return the number in base units, or the word."""
         if isinstance(value, str) and value in self.words:
             return value
         try:
@@ -194,9 +190,7 @@ class NumberOr(Rule):
             raise expected(self.describe(), value, hint) from None
 
     def describe(self) -> str:
-        """Return what it may be."""
         return " or ".join([", ".join(self.words), self.number.describe()])
 
     def json_schema(self) -> dict[str, Any]:
-        """Return the schema of either."""
         return {"anyOf": [self.number.json_schema(), {"enum": list(self.words)}]}

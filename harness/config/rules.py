@@ -128,11 +128,9 @@ class Choice(Rule):
         raise expected(self.describe(), value, hint)
 
     def describe(self) -> str:
-        """Return the list of the choices."""
         return one_of(self.choices)
 
     def json_schema(self) -> dict[str, Any]:
-        """Return an enum schema."""
         return {"enum": list(self.choices)}
 
 
@@ -147,11 +145,9 @@ class Flag(Rule):
         return value
 
     def describe(self) -> str:
-        """Return "true or false"."""
         return "true or false"
 
     def json_schema(self) -> dict[str, Any]:
-        """Return a boolean schema."""
         return {"type": "boolean"}
 
 
@@ -175,7 +171,6 @@ class OneOrMore(_Wrapper):
     optional: bool = False
 
     def prepare(self, value: Any) -> Any:
-        """Return the value as a list."""
         if value is None and self.optional:
             return []
         if isinstance(value, (list, tuple)):
@@ -201,13 +196,11 @@ class Several(_Wrapper):
     most: int
 
     def prepare(self, value: Any) -> Any:
-        """Return the list; one value alone is none."""
         if not isinstance(value, (list, tuple)) or not self.least <= len(value) <= self.most:
             raise expected(self.describe(), value)
         return value
 
     def describe(self) -> str:
-        """Return how many there may be."""
         return f"a list of {self.least} to {self.most} numbers"
 
     def __get_pydantic_json_schema__(
@@ -224,7 +217,6 @@ class Exactly(_Wrapper):
     spread: bool = False
 
     def prepare(self, value: Any) -> Any:
-        """Return the value as a list of the right length."""
         if isinstance(value, (list, tuple)):
             if len(value) != len(self.names):
                 raise expected(self.describe(), value)
@@ -234,7 +226,6 @@ class Exactly(_Wrapper):
         return [value] * len(self.names)
 
     def describe(self) -> str:
-        """Return the form of the list."""
         return ("one number or " if self.spread else "") + f"a list [{', '.join(self.names)}]"
 
     def __get_pydantic_json_schema__(

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from freepath.config.axes import TRACKER
 from freepath.config.base import Kind, OneOf
 from freepath.config.lights import LIGHTS
 from freepath.config.models import MAJORANTS, MEDIA
 from freepath.config.rays import RAYS
-from freepath.config.sweep import TRACKER, Config
+from freepath.config.sweep import Config
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 

@@ -3,13 +3,13 @@
 from pathlib import Path
 from typing import Annotated, Any
 
+from freepath.config.axes import AXES
 from freepath.config.base import UNKNOWN_KEY, Kind, Model, OneOf
 from freepath.config.document import Document, Location, path_text
-from freepath.config.lights import LIGHTS, Uniform
-from freepath.config.models import MAJORANTS, MEDIA, Fraction, Global, Seed
-from freepath.config.quantity import CountOr, Number, NumberOr
+from freepath.config.models import Fraction, Seed
+from freepath.config.quantity import Number
 from freepath.config.rays import RAYS, Orthographic
-from freepath.config.rules import Choice, Flag, OneOrMore, Text, expected, failure
+from freepath.config.rules import Flag, OneOrMore, Text, expected, failure
 from freepath.errors import Problem
 from pydantic import (
     ConfigDict,
@@ -18,79 +18,26 @@ from pydantic import (
     SerializerFunctionWrapHandler,
     ValidationError,
     ValidatorFunctionWrapHandler,
+    create_model,
     model_serializer,
     model_validator,
 )
 from pydantic_core import InitErrorDetails
 
-ESTIMANDS = ("transmittance", "free_path", "radiance", "path_length", "mean_extinction")
-ALONG_PATHS = ("radiance", "path_length")
-"""Estimands of paths that scatter; the axes light to effects are only theirs."""
-UNLIMITED = "unlimited"
-AUTO, ANALOG = "auto", "analog"
-"""Of p_absorb: none of bounded paths and roulette of others; what the albedo leaves."""
-LANES = ("auto", 1, 2, 4, 8, 16)
-ARITHMETIC = ("strict", "fast", "double")
-STORAGE = ("float", "half")
-# the word under which the models of the trackers are handed to a validation as its context
-TRACKER = "tracker"
-
 NAME = Text("a name of letters, digits, '.', '_' and '-'", r"[A-Za-z0-9][A-Za-z0-9._-]*")
 
-Estimands = Annotated[tuple[Annotated[str, Choice(ESTIMANDS)], ...], OneOrMore()]
-Media = Annotated[tuple[Annotated[Kind, OneOf("medium", MEDIA)], ...], OneOrMore()]
-Majorants = Annotated[tuple[Annotated[Kind, OneOf("majorant", MAJORANTS)], ...], OneOrMore()]
-Tightnesses = Annotated[tuple[Annotated[float, Number(above=0)], ...], OneOrMore()]
-Trackers = Annotated[tuple[Annotated[Kind, OneOf(TRACKER)], ...], OneOrMore()]
-Lights = Annotated[tuple[Annotated[Kind, OneOf("light", LIGHTS)], ...], OneOrMore()]
-Shadows = Annotated[tuple[Annotated[Kind, OneOf(TRACKER)], ...], OneOrMore(optional=True)]
-Scatterings = Annotated[tuple[Annotated[int | str, CountOr(UNLIMITED)], ...], OneOrMore()]
-Chance = NumberOr(Number("fraction", minimum=0, below=1), (AUTO, ANALOG))
-Absorptions = Annotated[tuple[Annotated[float | str, Chance], ...], OneOrMore()]
-Effects = Annotated[tuple[Annotated[str, Choice(("auto", "all"))], ...], OneOrMore()]
-Lanes = Annotated[tuple[Annotated[int | str, Choice(LANES)], ...], OneOrMore()]
-Arithmetics = Annotated[tuple[Annotated[str, Choice(ARITHMETIC)], ...], OneOrMore()]
-Storages = Annotated[tuple[Annotated[str, Choice(STORAGE)], ...], OneOrMore()]
-
-MediumPattern = Annotated[Kind, OneOf("medium", MEDIA, pattern=True)]
-MajorantPattern = Annotated[Kind, OneOf("majorant", MAJORANTS, pattern=True)]
-LightPattern = Annotated[Kind, OneOf("light", LIGHTS, pattern=True)]
-TrackerPattern = Annotated[Kind, OneOf(TRACKER, pattern=True)]
-
-
-class Matrix(Model):
-    """Axes whose every combination is a case; one value is an axis of one."""
-
-    estimand: Estimands = ("transmittance",)
-    """What a case estimates."""
-    medium: Media
-    """What the rays pass through."""
-    majorant: Majorants = (Global(),)
-    """Upper bounds of the extinction; trackers that need none ignore this axis."""
-    tightness: Tightnesses = (1.0,)
-    """Factor on the majorant: 1 is tight, below 1 it no longer bounds."""
-    tracker: Trackers
-    """How distances are sampled or transmittance is estimated."""
-    light: Lights = (Uniform(),)
-    """What shines on the medium, of radiance."""
-    scatterings: Scatterings = (UNLIMITED,)
-    """How often a path may scatter, of radiance; unlimited ends it by Russian roulette."""
-    p_absorb: Absorptions = (AUTO,)
-    """The chance that a path is absorbed at a collision, of radiance: analog is
-    1 - albedo; auto is 0 for bounded scatterings, and else Russian roulette by weight."""
-    shadow: Shadows = ()
-    """The tracker that estimates the transmittance towards a point light; ratio if left out."""
-    effects: Effects = ("auto",)
-    """auto compiles what the scene has; all compiles everything, for comparison."""
-    lanes: Lanes = ("auto",)
-    """Paths that a work-item follows at once; auto is the device's vector width."""
-    arithmetic: Arithmetics = ("strict",)
-    """strict float, fast (-cl-fast-relaxed-math) or double."""
-    storage: Storages = ("float",)
-    """How the voxels of a grid are stored: float or half; other media ignore this axis."""
-
-
-AXES = tuple(Matrix.model_fields)
+Matrix = create_model(
+    "Matrix",
+    __base__=Model,
+    __doc__="Axes whose every combination is a case; one value is an axis of one.",
+    **{
+        axis.name: (
+            axis.values(optional=axis.default == ()),
+            Field(... if axis.default is None else axis.default, description=axis.meaning),
+        )
+        for axis in AXES.values()
+    },
+)
 
 
 class Entry(Model):
@@ -111,43 +58,20 @@ class Entry(Model):
         return {name: getattr(self, name) for name in AXES if name in self.model_fields_set}
 
 
-class Include(Entry):
-    """Cases to add: the product of these axes, and of the matrix's for those left out."""
+Include = create_model(
+    "Include",
+    __base__=Entry,
+    __doc__="Cases to add: the product of these axes, and of the matrix's for those left out.",
+    **{axis.name: (axis.values(), Field(None)) for axis in AXES.values()},
+)
+Exclude = create_model(
+    "Exclude",
+    __base__=Entry,
+    __doc__="""Cases of the matrix to remove: those that match each of these axes.
 
-    estimand: Estimands = Field(None)
-    medium: Media = Field(None)
-    majorant: Majorants = Field(None)
-    tightness: Tightnesses = Field(None)
-    tracker: Trackers = Field(None)
-    light: Lights = Field(None)
-    scatterings: Scatterings = Field(None)
-    p_absorb: Absorptions = Field(None)
-    shadow: Trackers = Field(None)
-    effects: Effects = Field(None)
-    lanes: Lanes = Field(None)
-    arithmetic: Arithmetics = Field(None)
-    storage: Storages = Field(None)
-
-
-class Exclude(Entry):
-    """Cases of the matrix to remove: those that match each of these axes.
-
-    A bare kind matches whatever its parameters, a mapping the parameters that it gives.
-    """
-
-    estimand: Estimands = Field(None)
-    medium: Annotated[tuple[MediumPattern, ...], OneOrMore()] = Field(None)
-    majorant: Annotated[tuple[MajorantPattern, ...], OneOrMore()] = Field(None)
-    tightness: Tightnesses = Field(None)
-    tracker: Annotated[tuple[TrackerPattern, ...], OneOrMore()] = Field(None)
-    light: Annotated[tuple[LightPattern, ...], OneOrMore()] = Field(None)
-    scatterings: Scatterings = Field(None)
-    p_absorb: Absorptions = Field(None)
-    shadow: Annotated[tuple[TrackerPattern, ...], OneOrMore()] = Field(None)
-    effects: Effects = Field(None)
-    lanes: Lanes = Field(None)
-    arithmetic: Arithmetics = Field(None)
-    storage: Storages = Field(None)
+A bare kind matches whatever its parameters, a mapping the parameters that it gives.""",
+    **{axis.name: (axis.values(pattern=True), Field(None)) for axis in AXES.values()},
+)
 
 
 PRECISELY, EXACTLY = ("error", "time_noise", "at_most"), ("samples", "rounds")
@@ -232,6 +156,11 @@ class Config(Model):
     def path(self) -> Path | None:
         """The file it was loaded from; None for one made in a program."""
         return Path(self._document.name) if self._document else None
+
+    @property
+    def search_path(self) -> list[Path]:
+        """Where volumes, rays and images are looked for first: beside the config."""
+        return [self.path.parent] if self.path else []
 
     @property
     def text(self) -> str:

@@ -30,6 +30,8 @@ from freepath.report.axes import (
 from freepath.report.data import DEEPEST, Report
 
 POINTS = 32
+RMSE = "sqrt(pow(datum.b, 2) + datum.v * datum.t / datum.time)"
+"""freepath.ladder, for a record of a page."""
 
 
 def cost(report: Report) -> alt.LayerChart:
@@ -42,7 +44,7 @@ def cost(report: Report) -> alt.LayerChart:
         .transform_calculate(grid=f"sequence(0, {POINTS + 1})")
         .transform_flatten(["grid"])
         .transform_calculate(time=f"datum.t * pow(datum.hi / datum.t, datum.grid / {POINTS})")
-        .transform_calculate(error="sqrt(pow(datum.b, 2) + datum.v * datum.t / datum.time)")
+        .transform_calculate(error=RMSE)
         .transform_calculate(
             error=f"max(datum.error, {DEEPEST})",
             width=width,
@@ -99,9 +101,7 @@ def pareto(report: Report) -> alt.LayerChart:
         .transform_flatten(["grid"])
         .transform_calculate(time=f"datum.lo * pow(datum.hi / datum.lo, datum.grid / {2 * POINTS})")
         .transform_filter("datum.time >= datum.t * 0.999999")
-        .transform_calculate(
-            error=f"max({DEEPEST}, sqrt(pow(datum.b, 2) + datum.v * datum.t / datum.time))"
-        )
+        .transform_calculate(error=f"max({DEEPEST}, {RMSE})")
         .transform_joinaggregate(best="min(error)", groupby=["grid", "device"])
         .transform_filter("datum.error <= datum.best * 1.000001")
         .transform_joinaggregate(first="min(t)", groupby=["grid", "device"])

@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from freepath.errors import FreepathError
+from freepath.ladder import Ladder
 from freepath.results import CHECKS, CONFIRM, CONFIRM_COLUMNS, RUN, SUMMARY, read_rows
-from freepath.table import ROUGH, Row, along, bounces, lit, number, tracker_label, uncertainty
+from freepath.table import ROUGH, Row, along, bounces, lit, number, uncertainty
 
 DEEPEST, HIGHEST = 1e-4, 10.0
 """Relative errors between which curves are drawn."""
@@ -130,7 +131,7 @@ def _variants(rows: list[Row]) -> list[tuple[str, str]]:
 def _record(row: Row, variants: list[tuple[str, str]], device: str) -> dict[str, Any]:
     """A row as charts and tables use it; errors and variances are relative to the reference."""
     words = [text.format(row[name]) for name, text in variants]
-    label = ", ".join([tracker_label(row), *along(row), *words])
+    label = ", ".join([row["tracker_label"], *along(row), *words])
     none = row["majorant"] == "none"
     tightness = None if none else number(row, "tightness")
     majorant = "none" if none else f"{row['majorant']} x{tightness:g}"
@@ -207,7 +208,7 @@ def _span(rows: list[dict[str, Any]]) -> None:
     if not rows:
         return
     starts = [row["t"] for row in rows]
-    met = max(row["t"] * row["v"] / DEEPEST**2 for row in rows)
+    met = max(Ladder(0.0, row["v"], row["t"]).time_to(DEEPEST) for row in rows)
     low = min(starts)
     high = max(2 * max(starts), min(LONGEST * low, met))
     for row in rows:

@@ -26,12 +26,10 @@ class ClosedForm(Medium):
 
     @property
     def pieces_per_segment(self) -> int:
-        """Width of the arrays that `pieces` returns."""
         upright = np.array([[0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0]])
         return self._cuts(upright).shape[1] + 1
 
     def pieces(self, segments: Array) -> Pieces:
-        """Cut segments (N, 7) where the medium says so."""
         start, length = partition(self._cuts(segments), segments[:, 6])
 
         def partial(segment: Index, piece: Index, fraction: Array) -> Array:
@@ -53,7 +51,6 @@ class HeightMedium(ClosedForm):
         """Return smallest and largest sigma_t between heights (N,) and (N,), exactly."""
 
     def bounds(self, cells: tuple[int, int, int]) -> tuple[Array, Array]:
-        """Return the exact minorant and majorant over equal cells, each as [nz, ny, nx]."""
         nx, ny, nz = cells
         heights = edges(self.extent[2], nz)
         pair = self._height_bounds(heights[:-1], heights[1:])

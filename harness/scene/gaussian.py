@@ -28,7 +28,6 @@ class Gaussian(ClosedForm):
         return self.numbers["peak"] * np.exp(-square / (2.0 * self._width**2))
 
     def sigma_t(self, points: Array) -> Array:
-        """Return the extinction, by the distance from the center."""
         return self._at_square(np.sum((points - self._center) ** 2, axis=1))
 
     def _nearest(self, segments: Array) -> tuple[Array, Array]:
@@ -53,7 +52,6 @@ class Gaussian(ClosedForm):
         return np.clip(cuts, 0.0, segments[:, 6, None])
 
     def bounds(self, cells: tuple[int, int, int]) -> tuple[Array, Array]:
-        """Return the exact minorant and majorant over equal cells, each as [nz, ny, nx]."""
         nearest, farthest = 0.0, 0.0
         for axis, count in enumerate(cells):
             offset = edges(self.extent[axis], count) - self._center[axis]

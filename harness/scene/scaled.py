@@ -17,11 +17,9 @@ class Scaled(Medium):
         self._medium, self._factor = medium, float(factor)
 
     def sigma_t(self, points: Array) -> Array:
-        """Return the extinction at points (N, 3) of the box, as (N,)."""
         return self._factor * self._medium.sigma_t(points)
 
     def pieces(self, segments: Array) -> Pieces:
-        """Cut segments (N, 7) as the other medium does."""
         pieces = self._medium.pieces(segments)
 
         def partial(segment: Index, piece: Index, fraction: Array) -> Array:
@@ -31,7 +29,6 @@ class Scaled(Medium):
 
     @property
     def pieces_per_segment(self) -> int:
-        """Width of the arrays that `pieces` returns."""
         return self._medium.pieces_per_segment
 
     def optical_depth(self, segments: Array) -> Array:
@@ -45,12 +42,10 @@ class Scaled(Medium):
         return self._medium.distance(segments, depth / self._factor)
 
     def bounds(self, cells: tuple[int, int, int]) -> tuple[Array, Array]:
-        """Return minorant and majorant over equal cells, each as [nz, ny, nx]."""
         lower, upper = self._medium.bounds(cells)
         return self._factor * lower, self._factor * upper
 
     def mean(self) -> float:
-        """Return the mean extinction over the box."""
         return self._factor * self._medium.mean()
 
     def _content(self) -> tuple[NDArray, ...]:

@@ -7,15 +7,13 @@ recommended, the soonest cases of the sweep, and how the recommended one stands 
 
 import argparse
 import math
-import time
 from pathlib import Path
 
-from freepath import catalog, plan, recommend, session
-from freepath import config as configs
+from freepath import catalog, recommend
 from freepath.commands.common import volume_of
 from freepath.commands.recommend import told_of
 from freepath.device import open_devices
-from freepath.results import ResultFolder
+from freepath.sweep import Clock, Listener
 from freepath.table import seconds
 
 
@@ -29,8 +27,8 @@ def search_of(options: argparse.Namespace) -> recommend.Search:
         options.estimand,
         options.accuracy,
         options.budget,
-        (lambda row: None, lambda *told: None),
-        session.Clock(time.perf_counter()),
+        Listener(),
+        Clock(),
     )
 
 
@@ -39,14 +37,9 @@ def full_sweep(search: recommend.Search, at_most_s: float) -> dict[str, tuple[fl
     stop = recommend.PRECISION[-1] | {"at_most": f"{at_most_s:g} s"}
     path = search.folder / "full.yaml"
     path.write_text(search.config_text(search.every(), stop), "utf-8")
-    loaded = configs.load(path, search.known.parameter_models())
-    cases = plan.expand(loaded, search.known)
-    results = ResultFolder(search.folder / "full")
-    session.Run(loaded, search.known, cases, results, search.clock, *search.told).execute(
-        [search.device]
-    )
+    rows, _ = search.measure(path)
     never = math.inf, 0.0
-    return {r["case"]: recommend.needed(r, search.accuracy) or never for r in results.rows()}
+    return {r["case"]: recommend.needed(r, search.accuracy) or never for r in rows}
 
 
 def arguments() -> argparse.Namespace:

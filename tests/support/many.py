@@ -24,9 +24,9 @@ def many(result: Path, folder: Path, count: int = 10_000, media: int = 5) -> Pat
         for number, (turn, row) in enumerate(itertools.islice(turns, count)):
             case = row["case"].split("/")
             case[1] = medium = f"{row['medium']}-{turn % media}"
-            case[-3] = f"{case[-3]}-p={turn // media}"
+            case[-3] = label = f"{row['tracker_label']}-p={turn // media}"
             stretched = {name: str(float(row[name]) * (1 + turn / 97)) for name in times}
             ids = {"case_id": f"{number:012d}", "case": "/".join(case), "medium": medium}
-            writer.writerow(row | stretched | ids)
+            writer.writerow(row | stretched | ids | {"tracker_label": label})
     shutil.copy(result / RUN, folder / RUN)
     return folder

@@ -12,8 +12,8 @@ from freepath.check.generators import first_depths
 from freepath.check.media import MAJORANTS, MEDIA
 from freepath.check.model import Check, needs_double
 from freepath.check.rig import Rig
+from freepath.config.axes import ALONG_PATHS
 from freepath.config.models import MEDIA as MODELS
-from freepath.config.sweep import ALONG_PATHS
 
 Axes = dict[str, Any]
 
