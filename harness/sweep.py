@@ -118,6 +118,8 @@ class Sweep:
         ended = "failed"
         try:
             run_file.write(self.folder, facts, session | {"ended": "running, or killed"})
+            for device in self.devices:
+                device.compiler_log = self.folder.folder.resolve() / "compiler.log"
             for group in self._groups(left):
                 self._run(group)
             ended = "complete"
@@ -125,6 +127,8 @@ class Sweep:
             ended = "interrupted"
             raise
         finally:
+            for device in self.devices:
+                device.compiler_log = None
             ending = {"ended": ended, **self.clock.as_dict()}
             run_file.write(self.folder, facts, session | ending)
             self.folder.close()
@@ -157,7 +161,6 @@ class Sweep:
 
     def _run(self, jobs: list[Job]) -> None:
         """Build and measure jobs side by side; each row is written as it ends."""
-        jobs[0].device.compiler_log = self.folder.folder / "compiler.log"
         ready = []
         for job in jobs:
             if self._deaths_at(job) >= TWICE:

@@ -12,7 +12,7 @@ from pathlib import Path
 from freepath import catalog, recommend
 from freepath.commands.common import volume_of
 from freepath.commands.recommend import told_of
-from freepath.device import open_devices
+from freepath.selection import one_device
 from freepath.sweep import Clock, Listener
 from freepath.table import seconds
 
@@ -21,7 +21,7 @@ def search_of(options: argparse.Namespace) -> recommend.Search:
     """The search that `freepath recommend` makes."""
     return recommend.Search(
         catalog.load(),
-        open_devices([options.device] if options.device else [])[0],
+        one_device([options.device] if options.device else []),
         options.output,
         {"volume": volume_of(options.volume, options.sigma_t)},
         options.estimand,
