@@ -158,15 +158,8 @@ def structure_of(
     chromatic = tracker.channels == ANY
     paths = None
     if case.light is not None:
-        shadow_tracker = catalog.trackers[case.shadow.kind] if case.shadow else None
-        paths = effects.of_scene(
-            case,
-            medium,
-            tracker,
-            _shadow(case, catalog),
-            chromatic=chromatic,
-            shares=bool(shadow_tracker and tracker.shares_lookup and shadow_tracker.shares_lookup),
-        )
+        given = case, medium, tracker, _shadow(case, catalog)
+        paths = effects.of_scene(*given, chromatic=chromatic)
     shadow = paths.shadow if paths else None
     needs = tracker.needs | (shadow.needs if shadow else frozenset())
     return Structure(

@@ -21,7 +21,7 @@ from freepath.config.rules import Choice, Flag, OneOrMore, Rule, Text, expected,
 from freepath.config.schema import json_schema
 from freepath.config.sweep import ESTIMANDS
 from freepath.errors import CatalogError, ConfigError, Problem
-from freepath.kernel_files import split_front_matter
+from freepath.kernel_files import functions, split_front_matter
 from pydantic import ValidationInfo, create_model, field_validator
 
 NEEDS = ("majorant", "control", "closed_form", "cells", "light")
@@ -129,12 +129,20 @@ class FrontMatter(Model):
     escapes: Annotated[bool, Flag()] = True
     aims: Annotated[bool, Flag()] = False
     single_flight: Annotated[bool | dict[str, tuple[Any, ...]], Bounding()] = False
-    shares_lookup: Annotated[bool, Flag()] = False
+    shares_lookup: Any = None
     unbiased: Annotated[bool, Flag()] = True
     parameters: dict[str, Parameter] = {}
     uses: Annotated[tuple[Annotated[str, Choice(USES)], ...], OneOrMore(optional=True)] = ()
     state: dict[str, Annotated[str, Text("real, mask or index, or an array of them", STATE)]] = {}
     citation: Annotated[str, Text()] | None = None
+
+    @field_validator("shares_lookup", mode="before")
+    @classmethod
+    def _gone(cls, _: Any) -> Any:
+        what = (
+            "leave it out: a tracker that defines at_tentative in place of step shares its lookup"
+        )
+        raise failure(f"expected no such key any more; {what} (kernels/README.md)")
 
     @field_validator("parameters", "state", mode="before")
     @classmethod
@@ -173,8 +181,6 @@ class Tracker:
     """Whether directions are chosen with the light in mind too, by effects/aimed_direction."""
     single_flight: bool | dict[str, tuple[Any, ...]]
     """Whether, or for which choices, what it scores on its way is for no path that goes on."""
-    shares_lookup: bool
-    """Whether lanes on paths and on shadow rays may share a step's collision and its lookup."""
     unbiased: bool
     parameters: dict[str, Parameter]
     state: dict[str, str]
@@ -253,6 +259,7 @@ def read(file: Path) -> Tracker:
     if document.data is None:
         raise _bad(file, "expected title and estimands in the front matter, got nothing")
     front: FrontMatter = document.validate(FrontMatter)
+    _check_functions(file, code, front)
     return Tracker(
         name=file.stem,
         path=file,
@@ -267,7 +274,6 @@ def read(file: Path) -> Tracker:
         escapes=front.escapes,
         aims=front.aims,
         single_flight=front.single_flight,
-        shares_lookup=front.shares_lookup,
         unbiased=front.unbiased,
         parameters=front.parameters,
         state=front.state,
@@ -275,6 +281,24 @@ def read(file: Path) -> Tracker:
         citation=front.citation or "",
         model=_parameter_model(file.stem, front),
     )
+
+
+def _check_functions(file: Path, code: str, front: FrontMatter) -> None:
+    """Raise ConfigError where a tracker cannot be called."""
+    own = functions(code)
+    both = "at_tentative" in own and "step" in own
+    if "at_tentative" not in own:
+        missing = [name for name in ("begin", "step") if name not in own]
+        or_else = ", or at_tentative in place of both" if missing == ["begin", "step"] else ""
+        if missing:
+            what = f"the function{'s'[: len(missing) - 1]} {' and '.join(missing)}{or_else}"
+            raise _bad(file, f"expected {what}, got {', '.join(own) or 'none'} (kernels/README.md)")
+    elif both or "majorant" not in front.needs or "control" in front.needs:
+        what = "at_tentative or step, got both" if both else "needs: [majorant], for at_tentative"
+        place = own["step" if both else "at_tentative"]
+        raise ConfigError(
+            [Problem(str(file), place, 1, "", f"expected {what} (kernels/README.md)")]
+        )
 
 
 def _parameter_model(name: str, front: FrontMatter) -> type[Kind]:

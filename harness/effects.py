@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from freepath import kernel_files
 from freepath.config.sweep import AUTO, UNLIMITED
-from freepath.kernel_files import KernelFile
+from freepath.kernel_files import KernelFile, functions, taken
 from freepath.path_axes import chance_of_absorption
 
 MOST_SCATTERINGS = (1 << 24) - 1
@@ -88,7 +88,13 @@ class Effects:
         """What a path carries for its effects."""
         near = ["effects/near_light"] if self.near_light else []
         files = [kernel_files.read(name) for name in [*near, *self._after]]
-        return {name: kind for file in files for name, kind in file.state.items()}
+        state = {name: kind for file in files for name, kind in file.state.items()}
+        return state | {f"held_{name}": kind for name, kind in self._all_held(files[-1]).items()}
+
+    def _all_held(self, file: KernelFile) -> dict[str, str]:
+        """What a lane keeps of its path on a shadow ray: of the path itself and of its channels."""
+        channels = kernel_files.read(f"channels/{'several' if self.chromatic else 'one'}").state
+        return file.held | channels if self.modes else {}
 
     def around(self, tracker: KernelFile, *, exact: bool) -> list[KernelFile]:
         """The tracker's file with those of the effects before and behind it."""
@@ -102,20 +108,18 @@ class Effects:
             before += ["effects/near_light"] if self.near_light else []
             before += ["effects/angle_table"] if self.aims and self.phase != "isotropic" else []
             before.append(f"effects/{self._ended_by}")
-        names = "effects/mode_names" if self.modes else "effects/flight_names"
-        files = [kernel_files.read(name) for name in [*before, names]]
-        files.append(tracker)
+        own = [file.called("flight") for file in tracker.completed(step=not self.modes)]
         if self.shadow:
-            files.append(kernel_files.read("effects/shadow_names"))
-            files += [kernel_files.read("effects/shadow_mode_names")] if self.modes else []
-            files.append(KernelFile(f"trackers/{self.shadow.name}.cl", self.shadow.code))
-        after = [kernel_files.read(name) for name in ("effects/own_names", *self._after)]
-        return [
-            *files,
-            *after,
-            KernelFile("hooks", self._hooks()),
-            kernel_files.read("effects/paths"),
-        ]
+            shadow = KernelFile(f"trackers/{self.shadow.name}.cl", self.shadow.code)
+            choices = [name for name, _, _ in self.shadow.choices]
+            own.append(kernel_files.read("effects/shadow"))
+            own += [f.called("shadow", choices) for f in shadow.completed(step=not self.modes)]
+        after = [kernel_files.read(name) for name in self._after]
+        if self.modes:
+            after.insert(-1, KernelFile("held", self._held(after[-1])))
+        hooks = KernelFile("hooks", self._hooks())
+        files = map(kernel_files.read, before)
+        return [*files, *own, *after, hooks, kernel_files.read("effects/paths")]
 
     @property
     def _after(self) -> list[str]:
@@ -142,13 +146,27 @@ class Effects:
         beyond = ("length", "emission", "environment", "environment_image")
         return "until_out" if any(name in self for name in beyond) else "until_last_light"
 
+    def _held(self, file: KernelFile) -> str:
+        """How lanes keep their path and go on with it."""
+        places = {
+            name: f"path->{'' if name in file.held else 'state.'}{name}"
+            for name in self._all_held(file)
+        }
+        kinds = self._all_held(file)
+        hold = [taken(kind, f"path->state.held_{n}", places[n]) for n, kind in kinds.items()]
+        resume = [taken(kind, places[n], f"path->state.held_{n}") for n, kind in kinds.items()]
+        given = "Path *path, const mask where"
+        return "\n\n".join(
+            [_function("hold_path", given, hold), _function("resume_path", given, resume)]
+        )
+
     def _hooks(self) -> str:
         """What happens at the beginning of a path and at the end of a flight."""
         scatters = "scattering" in self
         at_begin = ["path->state.scatterings = (index)0;"] if scatters else []
         at_begin += ["path->state.shadow = path->state.waiting = (mask)0;"] if self.modes else []
         # a path may be cut off on a shadow ray
-        over = ["resume_path(path, ended & path->state.shadow);"] if self.modes else []
+        over = ["return_to_path(path, ended & path->state.shadow);"] if self.modes else []
         over += ["restore_ray(path, ended);"] if scatters else []
         at_end = "Path *path, const Scene *scene, Rng *rng, const mask "
         at_end += "stopped" if self.modes else "ended"
@@ -196,17 +214,18 @@ def _function(name: str, parameters: str, lines: list[str]) -> str:
 
 
 def of_scene(
-    case: Any, medium: Any, tracker: Any, shadow: Shadow | None, *, chromatic: bool, shares: bool
+    case: Any, medium: Any, tracker: Any, shadow: Shadow | None, *, chromatic: bool
 ) -> Effects:
     """Derive the effects of a case in its medium, followed by a tracker of the catalog.
 
-    `shares`: whether tracker and shadow can share the lookup of a step. `effects: all` has every
-    effect that this scene could have, switched on with what adds nothing.
+    `effects: all` has every effect that this scene could have, switched on with what adds nothing.
     """
     everything = case.effects == "all"
     count = len(medium.channels)
     channels = ALL_CHANNELS if everything and count == 1 else count
     names = _names(case, shadow, everything=everything)
+    # trackers that decide at a tentative collision can share it and its lookup
+    shares = shadow and all("at_tentative" in functions(one.code) for one in (tracker, shadow))
     phase = "isotropic"
     if case.medium.g or everything:
         phase = "henyey_greenstein"
@@ -220,7 +239,7 @@ def of_scene(
         near_light="light" in tracker.needs,
         aims=tracker.aims,
         shadow=shadow if "point_light" in names else None,
-        modes=shares and modes_pay(medium.kernel, channels) and "point_light" in names,
+        modes=bool(shares) and modes_pay(medium.kernel, channels) and "point_light" in names,
         values=_values(case, medium, names, channels),
     )
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from freepath import kernel_files
 from freepath.effects import SKY_COLUMNS, SKY_ROWS, Chosen, Effects
 from freepath.errors import CatalogError
-from freepath.kernel_files import KernelFile
+from freepath.kernel_files import KernelFile, taken
 
 SCALARS = {"strict": "float", "fast": "float", "double": "double"}
 BUILD_OPTIONS = {
@@ -91,7 +91,7 @@ def compose(structure: Structure) -> Source:
     tracker = KernelFile(f"trackers/{structure.tracker}.cl", structure.tracker_code)
     paths = structure.paths
     exact = structure.arithmetic == "double"
-    parts += _named(paths.around(tracker, exact=exact) if paths else [tracker])
+    parts += _named(paths.around(tracker, exact=exact) if paths else tracker.completed())
     record = "record/samples" if structure.record else "record/nothing"
     parts += _named(kernel_files.read(name) for name in ("lanes/tally", record, "main"))
     return Source("\n".join(parts), BUILD_OPTIONS[structure.arithmetic])
@@ -101,7 +101,7 @@ def _before_structs(structure: Structure) -> list[str]:
     lanes = "lanes/scalar" if structure.lanes == 1 else "lanes/vector"
     exact = structure.arithmetic == "double" or structure.logarithm == "builtin"
     logarithm = "math/log_builtin" if exact else "math/log_polynomial"
-    return [lanes, "lanes/common", logarithm, "lanes/rng"]
+    return [lanes, "lanes/common", logarithm, "lanes/rng", "lanes/ray"]
 
 
 def _walks(structure: Structure) -> list[str]:
@@ -166,8 +166,10 @@ def _defines(structure: Structure) -> str:
     if double:
         lines.insert(0, "#pragma OPENCL EXTENSION cl_khr_fp64 : enable")
     shadow = structure.paths.shadow if structure.paths else None
-    for parameter, chosen, choices in structure.choices + (shadow.choices if shadow else ()):
-        name = parameter.upper()
+    defined = [(name.upper(), *rest) for name, *rest in structure.choices]
+    of_shadow = shadow.choices if shadow else ()
+    defined += [(f"SHADOW_{name.upper()}", *rest) for name, *rest in of_shadow]
+    for name, chosen, choices in defined:
         lines += [f"#define {name}_{choice.upper()} {i}" for i, choice in enumerate(choices)]
         lines.append(f"#define {name} {name}_{chosen.upper()}")
     return "\n".join(lines)
@@ -227,33 +229,28 @@ def _type_of(group: str) -> str:
 def _state(structure: Structure, walks: list[KernelFile]) -> list[str]:
     """Declare what a path carries for its walk and its tracker, and how lanes take it over."""
     state = {name: kind for file in walks for name, kind in file.state.items()}
-    taken = sorted(state.keys() & dict(structure.tracker_state).keys())
-    if taken:
-        message = f"expected a name for its state other than '{taken[0]}', which a walk uses"
-        raise CatalogError(f"trackers/{structure.tracker}.cl: {message}")
-    state |= dict(structure.tracker_state)
     if structure.paths:
         state |= structure.paths.state
-        state |= dict(structure.paths.shadow.state) if structure.paths.shadow else {}
+    shadow = structure.paths.shadow if structure.paths else None
+    trackers = {structure.tracker: dict(structure.tracker_state)}
+    trackers |= {shadow.name: dict(shadow.state)} if shadow else {}
+    for name, own in trackers.items():
+        for field in own.keys() & state.keys():
+            message = f"expected a name for its state other than '{field}', which freepath uses"
+            raise CatalogError(f"trackers/{name}.cl: {message}")
+    state |= {field: kind for own in trackers.values() for field, kind in own.items()}
     lines = ["typedef struct {"]
     for name, kind in state.items():
         scalar, bracket, count = kind.replace("spectrum", "real[CHANNELS]").partition("[")
         lines.append(f"    {scalar} {name}{bracket}{count};")
     lines += [
         "} State;",
-        "static void merge_state(State *into, const State *from, const mask where)",
+        "static void take_state(State *into, const State *from, const mask where)",
     ]
     # arrays are scratch that a sample fills as it goes: there is nothing to take over at its start
-    merged = [name for name, kind in state.items() if "[" not in kind and kind != "spectrum"]
-    merges = [f"    into->{name} = choose(where, from->{name}, into->{name});" for name in merged]
-    spectra = [name for name, kind in state.items() if kind == "spectrum"]
-    if spectra:
-        merges.append("    for (int c = 0; c < CHANNELS; ++c) {")
-        merges += [
-            f"        into->{n}[c] = choose(where, from->{n}[c], into->{n}[c]);" for n in spectra
-        ]
-        merges.append("    }")
-    return [*lines, "{", *merges, "}"]
+    kept = {name: kind for name, kind in state.items() if "[" not in kind}
+    takes = [f"    {taken(kind, f'into->{n}', f'from->{n}')}" for n, kind in kept.items()]
+    return [*lines, "{", *takes, "}"]
 
 
 def numbers_of(  # noqa: PLR0913, PLR0917 (one group of the kernel's Numbers each)

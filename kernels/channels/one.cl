@@ -3,7 +3,7 @@ title: A path has one weight
 state:
   collected: real
 ---*/
-/* What a path scores, in a medium or for a tracker of one channel. path->state.collected is what it deposited
+/* What a path scores, in a medium or for a tracker of one channel. path->state.collected is what it splatted
    so far, beside what the end of the flight will score. */
 static void channels_begin(Path *path) { path->state.collected = (real)0; }
 
@@ -15,7 +15,7 @@ static real score_of(const Path *path, const int channel)
 }
 
 /* Lanes `where` score a part of their weight as if the flight ended at t, and fly on. */
-static void deposit(Path *path, const real weight, const real t, const mask escaped, const mask where)
+static void splat(Path *path, const real weight, const real t, const mask escaped, const mask where)
 {
     const real part = score(weight, t, escaped);
     path->state.collected = choose(where, path->state.collected + part, path->state.collected);

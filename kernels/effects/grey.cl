@@ -1,5 +1,5 @@
 /* Weights and what is collected, of paths of one channel. */
-static void tint(Path *path, const int channel, const real factor, const mask where)
+static void scale_throughput(Path *path, const int channel, const real factor, const mask where)
 {
     path->weight = choose(where, path->weight * factor, path->weight);
 }

@@ -13,7 +13,7 @@ static void begin(Path *path, const Scene *scene, Rng *rng) { path->target = sam
 
 static void step(Path *path, const Scene *scene, Rng *rng)
 {
-    path->depth = optical_depth(path, scene, path->length);
+    path->depth = optical_depth(path, scene, path->ray.length);
     const mask here = path->live & less(path->target, path->depth);
     if (any_lane(here))
         path->t = choose(here, distance_to(path, scene, path->target), path->t);

@@ -27,7 +27,7 @@ static void step(Path *path, const Scene *scene, Rng *rng)
     collide(path, here);
     path->depth = choose(path->live, depth, path->depth);
     path->t = choose(path->live, t_exit, path->t);
-    const mask leaving = path->live & ~less(t_exit, path->length);
+    const mask leaving = path->live & ~less(t_exit, path->ray.length);
     escape_through_depth(path, leaving);
     cell_cross(path, path->live);
 }

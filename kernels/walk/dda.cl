@@ -1,15 +1,9 @@
 /*---
 title: Walk through the cells of a regular grid (Amanatides and Woo 1987)
 state:
-  first_x: real
-  first_y: real
-  first_z: real
-  delta_x: real
-  delta_y: real
-  delta_z: real
-  crossed_x: real
-  crossed_y: real
-  crossed_z: real
+  first: Vector
+  delta: Vector
+  crossed: Vector
 ---*/
 /* The n-th plane of an axis is met at first + n delta: one rounding however many were crossed, where a
    running sum would drift. A ray along a plane never meets that axis (FAR), nor does one that rounding
@@ -29,48 +23,38 @@ static void dda_axis(const real where, const real velocity, const real length, c
     *delta = choose(flat, (real)0, pace);
 }
 
-static real dda_next_x(const Path *path)
+/* Start a walk at a place in cells, through so many along each axis; returns the cell there. */
+static Indices dda_begin(Path *path, const Vector where, const Vector velocity, const SCALAR nx, const SCALAR ny,
+                         const SCALAR nz)
 {
-    return path->state.first_x + path->state.crossed_x * path->state.delta_x;
+    State *walk = &path->state;
+    Indices cell;
+    dda_axis(where.x, velocity.x, path->ray.length, nx, &cell.x, &walk->first.x, &walk->delta.x);
+    dda_axis(where.y, velocity.y, path->ray.length, ny, &cell.y, &walk->first.y, &walk->delta.y);
+    dda_axis(where.z, velocity.z, path->ray.length, nz, &cell.z, &walk->first.z, &walk->delta.z);
+    walk->crossed.x = walk->crossed.y = walk->crossed.z = (real)0;
+    return cell;
 }
 
-static real dda_next_y(const Path *path)
+static Vector dda_next(const State *walk)
 {
-    return path->state.first_y + path->state.crossed_y * path->state.delta_y;
-}
-
-static real dda_next_z(const Path *path)
-{
-    return path->state.first_z + path->state.crossed_z * path->state.delta_z;
-}
-
-static void dda_begin(Path *path)
-{
-    path->state.crossed_x = path->state.crossed_y = path->state.crossed_z = (real)0;
+    const Vector next = {walk->first.x + walk->crossed.x * walk->delta.x, walk->first.y + walk->crossed.y * walk->delta.y,
+                         walk->first.z + walk->crossed.z * walk->delta.z};
+    return next;
 }
 
 /* Where the ray meets the next plane of the grid. */
-static real dda_plane(const Path *path)
-{
-    const real next_x = dda_next_x(path), next_y = dda_next_y(path), next_z = dda_next_z(path);
-    const real nearer = smaller(next_x, next_y);
-    return smaller(nearer, next_z);
-}
+static real dda_plane(const Path *path) { return least_of(dda_next(&path->state)); }
 
-typedef struct {
-    mask x, y, z;
-} Crossed;
-
-/* Lanes `where` cross the plane; returns the axes along which they enter another cell. */
-static Crossed dda_cross(Path *path, const real plane, const mask where)
+/* Lanes `where` cross the plane; returns along which axes they enter another cell, as masks. */
+static Indices dda_cross(Path *path, const real plane, const mask where)
 {
-    Crossed crossed;
-    crossed.x = where & ~less(plane, dda_next_x(path));
-    crossed.y = where & ~less(plane, dda_next_y(path));
-    crossed.z = where & ~less(plane, dda_next_z(path));
-    path->state.crossed_x -= to_real(crossed.x);
-    path->state.crossed_y -= to_real(crossed.y);
-    path->state.crossed_z -= to_real(crossed.z);
+    State *walk = &path->state;
+    const Vector next = dda_next(walk);
+    const Indices crossed = {where & ~less(plane, next.x), where & ~less(plane, next.y), where & ~less(plane, next.z)};
+    walk->crossed.x -= to_real(crossed.x);
+    walk->crossed.y -= to_real(crossed.y);
+    walk->crossed.z -= to_real(crossed.z);
     count(path->crossings, where);
     return crossed;
 }
