@@ -8,7 +8,7 @@ import json
 import re
 import sys
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -21,7 +21,7 @@ from freepath.config.rules import Choice, Flag, OneOrMore, Rule, Text, expected,
 from freepath.config.schema import json_schema
 from freepath.config.sweep import ESTIMANDS
 from freepath.errors import CatalogError, ConfigError, Problem
-from freepath.kernel_files import functions, split_front_matter
+from freepath.kernel_files import CONTRACT, functions, split_front_matter
 from pydantic import ValidationInfo, create_model, field_validator
 
 NEEDS = ("majorant", "control", "closed_form", "cells", "light")
@@ -120,21 +120,29 @@ class FrontMatter(Model):
 
     title: Annotated[str, Text()]
     estimands: Annotated[tuple[Annotated[str, Choice(ESTIMANDS)], ...], OneOrMore()]
-    needs: Annotated[tuple[Annotated[str, Choice(NEEDS)], ...], OneOrMore(optional=True)] = ()
+    needs: Annotated[frozenset[Annotated[str, Choice(NEEDS)]], OneOrMore(optional=True)] = (
+        frozenset()
+    )
     channels: Annotated[int | str, Channels()] = 1
+    """How many it follows; ANY for as many as the medium has, each with a weight of its own."""
     majorants: Annotated[tuple[Annotated[str, Choice(tuple(MAJORANTS))], ...], OneOrMore()] = tuple(
         MAJORANTS
     )
     bounding: Annotated[bool | dict[str, tuple[Any, ...]], Bounding()] = False
+    """Whether it is only right where the majorant bounds; or for which choices of a parameter."""
     escapes: Annotated[bool, Flag()] = True
+    """Whether a flight may leave the medium: one that never does meets no environment."""
     aims: Annotated[bool, Flag()] = False
+    """Whether directions are chosen with the light in mind too, by effects/aimed_direction."""
     single_flight: Annotated[bool | dict[str, tuple[Any, ...]], Bounding()] = False
+    """Whether, or for which choices, what it scores on its way is for no path that goes on."""
     shares_lookup: Any = None
     unbiased: Annotated[bool, Flag()] = True
     parameters: dict[str, Parameter] = {}
     uses: Annotated[tuple[Annotated[str, Choice(USES)], ...], OneOrMore(optional=True)] = ()
     state: dict[str, Annotated[str, Text("real, mask or index, or an array of them", STATE)]] = {}
-    citation: Annotated[str, Text()] | None = None
+    """Fields that a path carries for this tracker: their names and types."""
+    citation: Annotated[str, Text()] = ""
 
     @field_validator("shares_lookup", mode="before")
     @classmethod
@@ -158,8 +166,7 @@ class FrontMatter(Model):
         return fields
 
 
-@dataclass(frozen=True)
-class Tracker:
+class Tracker(FrontMatter):
     """A tracker: the front matter of its file, its code, and the file's whole text."""
 
     name: str
@@ -167,27 +174,8 @@ class Tracker:
     source: str
     code: str
     """The text with empty lines for the front matter: line numbers are those of the file."""
-    title: str
-    estimands: tuple[str, ...]
-    needs: frozenset[str]
-    channels: int | str
-    """How many it follows; ANY for as many as the medium has, each with a weight of its own."""
-    majorants: tuple[str, ...]
-    bounding: bool | dict[str, tuple[Any, ...]]
-    """Whether it is only right where the majorant bounds; or for which choices of a parameter."""
-    escapes: bool
-    """Whether a flight may leave the medium: one that never does meets no environment."""
-    aims: bool
-    """Whether directions are chosen with the light in mind too, by effects/aimed_direction."""
-    single_flight: bool | dict[str, tuple[Any, ...]]
-    """Whether, or for which choices, what it scores on its way is for no path that goes on."""
-    unbiased: bool
-    parameters: dict[str, Parameter]
-    state: dict[str, str]
-    """Fields that a path carries for this tracker: their names and types."""
-    uses: tuple[str, ...]
-    citation: str
-    model: type[Kind] = field(repr=False)
+    model: type[Kind]
+    """Of its parameters, as a config may give them."""
 
 
 @dataclass(frozen=True)
@@ -260,45 +248,19 @@ def read(file: Path) -> Tracker:
         raise _bad(file, "expected title and estimands in the front matter, got nothing")
     front: FrontMatter = document.validate(FrontMatter)
     _check_functions(file, code, front)
-    return Tracker(
-        name=file.stem,
-        path=file,
-        source=source,
-        code=code,
-        title=front.title,
-        estimands=front.estimands,
-        needs=frozenset(front.needs),
-        channels=front.channels,
-        majorants=front.majorants,
-        bounding=front.bounding,
-        escapes=front.escapes,
-        aims=front.aims,
-        single_flight=front.single_flight,
-        unbiased=front.unbiased,
-        parameters=front.parameters,
-        state=front.state,
-        uses=front.uses,
-        citation=front.citation or "",
-        model=_parameter_model(file.stem, front),
-    )
+    model = _parameter_model(file.stem, front)
+    given = {"name": file.stem, "path": file, "source": source, "code": code, "model": model}
+    return Tracker.model_construct(**dict(front) | given)
 
 
 def _check_functions(file: Path, code: str, front: FrontMatter) -> None:
     """Raise ConfigError where a tracker cannot be called."""
-    own = functions(code)
-    both = "at_tentative" in own and "step" in own
-    if "at_tentative" not in own:
-        missing = [name for name in ("begin", "step") if name not in own]
-        or_else = ", or at_tentative in place of both" if missing == ["begin", "step"] else ""
-        if missing:
-            what = f"the function{'s'[: len(missing) - 1]} {' and '.join(missing)}{or_else}"
-            raise _bad(file, f"expected {what}, got {', '.join(own) or 'none'} (kernels/README.md)")
-    elif both or "majorant" not in front.needs or "control" in front.needs:
-        what = "at_tentative or step, got both" if both else "needs: [majorant], for at_tentative"
-        place = own["step" if both else "at_tentative"]
-        raise ConfigError(
-            [Problem(str(file), place, 1, "", f"expected {what} (kernels/README.md)")]
-        )
+    got = [name for name in CONTRACT if name in functions(code)]
+    if got not in (["begin", "step"], ["begin", "at_tentative"], ["at_tentative"]):
+        what = "the functions begin and step, or at_tentative in place of step"
+        raise _bad(file, f"expected {what}, got {' and '.join(got) or 'none'} (kernels/README.md)")
+    if "step" not in got and ("majorant" not in front.needs or "control" in front.needs):
+        raise _bad(file, "expected needs: [majorant], and no control, for at_tentative")
 
 
 def _parameter_model(name: str, front: FrontMatter) -> type[Kind]:

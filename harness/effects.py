@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 from freepath import kernel_files
 from freepath.config.sweep import AUTO, UNLIMITED
-from freepath.kernel_files import KernelFile, functions, taken
+from freepath.kernel_files import KernelFile, TrackerFile, taken
 from freepath.path_axes import chance_of_absorption
 
 MOST_SCATTERINGS = (1 << 24) - 1
 """What `unlimited` is in a kernel, which counts in float; far above any path's steps."""
 ALL_CHANNELS = 3
-Chosen = tuple[str, str, tuple[str, ...]]
-"""(parameter, what was chosen, all that can be chosen), each a define of a tracker."""
+HELD = {"ray": "Ray", "t": "real", "weight": "real"}
+"""What a path is at a collision, beside what it has in each channel."""
 SKY_ROWS, SKY_COLUMNS = 64, 128
 """Of the table that an image of the environment is resampled to, without the rows beyond poles."""
 
@@ -27,19 +27,6 @@ def modes_pay(medium: str, channels: int) -> bool:
     Where it is dear, in voxel grids, and holding a path is not: docs/decisions/shadow-rays.md.
     """
     return medium in {"grid_nearest", "grid_trilinear"} and channels == 1
-
-
-@dataclass(frozen=True)
-class Shadow:
-    """The tracker of shadow rays: its code, and what it declares."""
-
-    name: str
-    code: str
-    needs: frozenset[str]
-    numbers: tuple[str, ...]
-    choices: tuple[Chosen, ...]
-    state: tuple[tuple[str, str], ...]
-    uses: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -54,7 +41,7 @@ class Effects:
     """Whether the tracker chooses distances with the light in mind."""
     aims: bool = False
     """Whether it chooses directions so too."""
-    shadow: Shadow | None = None
+    shadow: TrackerFile | None = None
     modes: bool = False
     """Whether a lane is on its path or on a shadow ray; else these are flown in an inner loop."""
     values: Mapping[str, Mapping[str, Any]] = field(default_factory=dict, hash=False)
@@ -89,16 +76,19 @@ class Effects:
         near = ["effects/near_light"] if self.near_light else []
         files = [kernel_files.read(name) for name in [*near, *self._after]]
         state = {name: kind for file in files for name, kind in file.state.items()}
-        return state | {f"held_{name}": kind for name, kind in self._all_held(files[-1]).items()}
+        return state | {f"held_{name}": kind for name, (kind, _) in self._held.items()}
 
-    def _all_held(self, file: KernelFile) -> dict[str, str]:
-        """What a lane keeps of its path on a shadow ray: of the path itself and of its channels."""
+    @property
+    def _held(self) -> dict[str, tuple[str, str]]:
+        """The kind and the place of what a lane keeps of its path while it flies a shadow ray."""
         channels = kernel_files.read(f"channels/{'several' if self.chromatic else 'one'}").state
-        return file.held | channels if self.modes else {}
+        held = {name: (kind, f"path->{name}") for name, kind in HELD.items()}
+        held |= {name: (kind, f"path->state.{name}") for name, kind in channels.items()}
+        return held if self.modes else {}
 
-    def around(self, tracker: KernelFile, *, exact: bool) -> list[KernelFile]:
-        """The tracker's file with those of the effects before and behind it."""
-        before = ["effects/chromatic" if self.chromatic else "effects/grey"]
+    def around(self, tracker: TrackerFile, *, exact: bool) -> list[KernelFile]:
+        """The tracker's files with those of the effects before and behind them."""
+        before = []
         if "scattering" in self:
             circle = "math/circle_builtin" if exact else "math/circle_polynomial"
             before += [circle, f"phase/{self.phase}"]
@@ -108,18 +98,14 @@ class Effects:
             before += ["effects/near_light"] if self.near_light else []
             before += ["effects/angle_table"] if self.aims and self.phase != "isotropic" else []
             before.append(f"effects/{self._ended_by}")
-        own = [file.called("flight") for file in tracker.completed(step=not self.modes)]
+        files = [kernel_files.read(name) for name in before]
+        files += tracker.files("flight", step=not self.modes)
         if self.shadow:
-            shadow = KernelFile(f"trackers/{self.shadow.name}.cl", self.shadow.code)
-            choices = [name for name, _, _ in self.shadow.choices]
-            own.append(kernel_files.read("effects/shadow"))
-            own += [f.called("shadow", choices) for f in shadow.completed(step=not self.modes)]
-        after = [kernel_files.read(name) for name in self._after]
-        if self.modes:
-            after.insert(-1, KernelFile("held", self._held(after[-1])))
-        hooks = KernelFile("hooks", self._hooks())
-        files = map(kernel_files.read, before)
-        return [*files, *own, *after, hooks, kernel_files.read("effects/paths")]
+            files.append(kernel_files.read("effects/shadow"))
+            files += self.shadow.files("shadow", step=not self.modes)
+        files += [KernelFile("held", self._keeping())] if self.modes else []
+        files += [kernel_files.read(name) for name in self._after]
+        return [*files, KernelFile("hooks", self._hooks()), kernel_files.read("effects/paths")]
 
     @property
     def _after(self) -> list[str]:
@@ -146,19 +132,14 @@ class Effects:
         beyond = ("length", "emission", "environment", "environment_image")
         return "until_out" if any(name in self for name in beyond) else "until_last_light"
 
-    def _held(self, file: KernelFile) -> str:
+    def _keeping(self) -> str:
         """How lanes keep their path and go on with it."""
-        places = {
-            name: f"path->{'' if name in file.held else 'state.'}{name}"
-            for name in self._all_held(file)
-        }
-        kinds = self._all_held(file)
-        hold = [taken(kind, f"path->state.held_{n}", places[n]) for n, kind in kinds.items()]
-        resume = [taken(kind, places[n], f"path->state.held_{n}") for n, kind in kinds.items()]
+        kept = [(kind, at, f"path->state.held_{n}") for n, (kind, at) in self._held.items()]
+        hold = [taken(kind, held, at) for kind, at, held in kept]
+        resume = [taken(kind, at, held) for kind, at, held in kept]
+        both = {"hold_path": hold, "resume_path": resume}
         given = "Path *path, const mask where"
-        return "\n\n".join(
-            [_function("hold_path", given, hold), _function("resume_path", given, resume)]
-        )
+        return "\n\n".join(_function(name, given, lines) for name, lines in both.items())
 
     def _hooks(self) -> str:
         """What happens at the beginning of a path and at the end of a flight."""
@@ -214,9 +195,9 @@ def _function(name: str, parameters: str, lines: list[str]) -> str:
 
 
 def of_scene(
-    case: Any, medium: Any, tracker: Any, shadow: Shadow | None, *, chromatic: bool
+    case: Any, medium: Any, tracker: TrackerFile, shadow: TrackerFile | None, *, chromatic: bool
 ) -> Effects:
-    """Derive the effects of a case in its medium, followed by a tracker of the catalog.
+    """Derive the effects of a case in its medium, followed by a tracker.
 
     `effects: all` has every effect that this scene could have, switched on with what adds nothing.
     """
@@ -225,7 +206,7 @@ def of_scene(
     channels = ALL_CHANNELS if everything and count == 1 else count
     names = _names(case, shadow, everything=everything)
     # trackers that decide at a tentative collision can share it and its lookup
-    shares = shadow and all("at_tentative" in functions(one.code) for one in (tracker, shadow))
+    shares = shadow and tracker.at_tentative and shadow.at_tentative
     phase = "isotropic"
     if case.medium.g or everything:
         phase = "henyey_greenstein"
@@ -244,7 +225,7 @@ def of_scene(
     )
 
 
-def _names(case: Any, shadow: Shadow | None, *, everything: bool) -> tuple[str, ...]:
+def _names(case: Any, shadow: TrackerFile | None, *, everything: bool) -> tuple[str, ...]:
     """The effects that a scene has, or all that it could have."""
     model, light = case.medium, case.light
     collects = case.estimand != "path_length"

@@ -8,9 +8,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from freepath import kernel_files
-from freepath.effects import SKY_COLUMNS, SKY_ROWS, Chosen, Effects
+from freepath.config.sweep import ALONG_PATHS
+from freepath.effects import SKY_COLUMNS, SKY_ROWS, Effects
 from freepath.errors import CatalogError
-from freepath.kernel_files import KernelFile, taken
+from freepath.kernel_files import KernelFile, TrackerFile, taken
 
 SCALARS = {"strict": "float", "fast": "float", "double": "double"}
 BUILD_OPTIONS = {
@@ -25,11 +26,9 @@ BOX = ("extent_x", "extent_y", "extent_z")
 class Structure:
     """All that decides which source a case has; numbers are kernel arguments and do not."""
 
-    tracker: str
-    tracker_code: str
+    tracker: TrackerFile
     needs: frozenset[str]
-    tracker_numbers: tuple[str, ...]
-    choices: tuple[Chosen, ...]
+    """Of the tracker, and of the one of its shadow rays."""
     estimand: str
     medium: str
     medium_numbers: tuple[str, ...]
@@ -44,11 +43,15 @@ class Structure:
     """Whether a path has a weight for each channel, be it one; or one weight."""
     paths: Effects | None = None
     """What happens along paths that scatter; None where a sample is one flight."""
-    tracker_state: tuple[tuple[str, str], ...] = ()
-    tracker_uses: tuple[str, ...] = ()
     logarithm: str = "polynomial"
     count: bool = False
     record: bool = False
+
+    @property
+    def trackers(self) -> list[TrackerFile]:
+        """The tracker, and that of its shadow rays."""
+        shadow = self.paths.shadow if self.paths else None
+        return [self.tracker, shadow] if shadow else [self.tracker]
 
 
 @dataclass(frozen=True)
@@ -80,18 +83,18 @@ def compose(structure: Structure) -> Source:
     """Concatenate the files of a case, each behind a `#line` that names it to the compiler."""
     parts = [_defines(structure)]
     parts += _named(kernel_files.read(name) for name in _before_structs(structure))
-    walks = _with_uses([*_walks(structure), *structure.tracker_uses])
+    uses = [name for tracker in structure.trackers for name in tracker.uses]
+    walks = _with_uses([*_walks(structure), *uses])
     channels = kernel_files.read(f"channels/{'several' if structure.chromatic else 'one'}")
     parts.append(_structs(structure, [*walks, channels]))
-    middle = [f"estimands/{structure.estimand}", "count/on" if structure.count else "count/off"]
+    estimand = "along_paths" if structure.estimand in ALONG_PATHS else structure.estimand
+    middle = [f"estimands/{estimand}", "count/on" if structure.count else "count/off"]
     middle += ["storage/half"] if structure.storage == "half" else []
     middle += [f"medium/{structure.medium}", "lanes/path"]
     files = [*(kernel_files.read(name) for name in middle), channels, *walks]
     parts += _named(_as_stored(file, structure) for file in files)
-    tracker = KernelFile(f"trackers/{structure.tracker}.cl", structure.tracker_code)
-    paths = structure.paths
-    exact = structure.arithmetic == "double"
-    parts += _named(paths.around(tracker, exact=exact) if paths else tracker.completed())
+    tracker, paths, exact = structure.tracker, structure.paths, structure.arithmetic == "double"
+    parts += _named(paths.around(tracker, exact=exact) if paths else tracker.files())
     record = "record/samples" if structure.record else "record/nothing"
     parts += _named(kernel_files.read(name) for name in ("lanes/tally", record, "main"))
     return Source("\n".join(parts), BUILD_OPTIONS[structure.arithmetic])
@@ -108,7 +111,9 @@ def _walks(structure: Structure) -> list[str]:
     walks = []
     if "majorant" in structure.needs:
         walk = "control" if "control" in structure.needs else "majorant"
-        walks.append(f"{walk}/{structure.majorant}")
+        cells = structure.majorant != "global"
+        walks += [f"walk/{structure.majorant}"] if cells else []
+        walks.append(f"{walk}/{'cell_by_cell' if cells else 'global'}")
     needed = (need for need in ("closed_form", "cells") if need in structure.needs)
     return walks + [f"{need}/{structure.medium}" for need in needed]
 
@@ -165,13 +170,8 @@ def _defines(structure: Structure) -> str:
         lines += [f"#define SKY_ROWS {SKY_ROWS}", f"#define SKY_COLUMNS {SKY_COLUMNS}"]
     if double:
         lines.insert(0, "#pragma OPENCL EXTENSION cl_khr_fp64 : enable")
-    shadow = structure.paths.shadow if structure.paths else None
-    defined = [(name.upper(), *rest) for name, *rest in structure.choices]
-    of_shadow = shadow.choices if shadow else ()
-    defined += [(f"SHADOW_{name.upper()}", *rest) for name, *rest in of_shadow]
-    for name, chosen, choices in defined:
-        lines += [f"#define {name}_{choice.upper()} {i}" for i, choice in enumerate(choices)]
-        lines.append(f"#define {name} {name}_{chosen.upper()}")
+    for prefix, tracker in zip(("", "SHADOW_"), structure.trackers, strict=False):
+        lines += tracker.defines(prefix)
     return "\n".join(lines)
 
 
@@ -182,7 +182,7 @@ def _structs(structure: Structure, walks: list[KernelFile]) -> str:
         "medium": structure.medium_numbers,
         "majorant": structure.majorant_numbers if "majorant" in structure.needs else (),
         "channels": ("extinction[CHANNELS]", "largest") if structure.chromatic else (),
-        "tracker": structure.tracker_numbers,
+        "tracker": structure.tracker.numbers,
     }
     if structure.paths:
         groups |= structure.paths.groups
@@ -231,14 +231,11 @@ def _state(structure: Structure, walks: list[KernelFile]) -> list[str]:
     state = {name: kind for file in walks for name, kind in file.state.items()}
     if structure.paths:
         state |= structure.paths.state
-    shadow = structure.paths.shadow if structure.paths else None
-    trackers = {structure.tracker: dict(structure.tracker_state)}
-    trackers |= {shadow.name: dict(shadow.state)} if shadow else {}
-    for name, own in trackers.items():
-        for field in own.keys() & state.keys():
-            message = f"expected a name for its state other than '{field}', which freepath uses"
-            raise CatalogError(f"trackers/{name}.cl: {message}")
-    state |= {field: kind for own in trackers.values() for field, kind in own.items()}
+    for tracker in structure.trackers:
+        for name in sorted(dict(tracker.state).keys() & state.keys()):
+            message = f"expected a name for its state other than '{name}', which freepath uses"
+            raise CatalogError(f"trackers/{tracker.name}.cl: {message}")
+    state |= {name: kind for tracker in structure.trackers for name, kind in tracker.state}
     lines = ["typedef struct {"]
     for name, kind in state.items():
         scalar, bracket, count = kind.replace("spectrum", "real[CHANNELS]").partition("[")
@@ -268,7 +265,7 @@ def numbers_of(  # noqa: PLR0913, PLR0917 (one group of the kernel's Numbers eac
         values += [majorant[name] for name in structure.majorant_numbers]
     if structure.chromatic:
         values += [*channels, max(channels)]
-    values += [tracker[name] for name in structure.tracker_numbers]
+    values += [tracker[name] for name in structure.tracker.numbers]
     if structure.paths:
         values += structure.paths.numbers
         if structure.paths.shadow:

@@ -1,9 +1,7 @@
 /*---
 title: The layers of a stack
 uses: [cells/constant]
-state:
-  layer: index
-  upwards: index
+state: {layer: index, upwards: index}
 ---*/
 static void cells_begin(Path *path, const Scene *scene)
 {

@@ -1,8 +1,6 @@
 /*---
 title: A path has a weight for each channel
-state:
-  throughput: spectrum
-  collected: spectrum
+state: {throughput: spectrum, collected: spectrum}
 ---*/
 /* What a path scores in each channel: its weight, which all channels share, times its throughput. */
 static void channels_begin(Path *path)
@@ -15,16 +13,22 @@ static void channels_begin(Path *path)
 
 static real weight_of(const Path *path, const int channel) { return path->weight * path->state.throughput[channel]; }
 
-static real score_of(const Path *path, const int channel)
-{
-    return path->state.collected[channel] + score(weight_of(path, channel), path->t, path->escaped);
-}
-
-/* Lanes `where` have the throughput of a channel multiplied. */
+/* Lanes `where` have the weight of a channel multiplied. */
 static void scale_throughput(Path *path, const int channel, const real factor, const mask where)
 {
     real *throughput = &path->state.throughput[channel];
     *throughput = choose(where, *throughput * factor, *throughput);
+}
+
+static void collect(Path *path, const int channel, const real value, const mask where)
+{
+    real *sum = &path->state.collected[channel];
+    *sum = choose(where, *sum + value, *sum);
+}
+
+static real score_of(const Path *path, const int channel)
+{
+    return path->state.collected[channel] + score(weight_of(path, channel), path->t, path->escaped);
 }
 
 /* The extinction at a tentative collision before it is multiplied by each channel's own,

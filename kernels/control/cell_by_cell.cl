@@ -1,8 +1,7 @@
 /*---
 title: A control and a majorant of the residual for each cell
 uses: [control/collide, walk/cell_by_cell]
-state:
-  control: real
+state: {control: real}
 ---*/
 static void enter_controlled_cell(Path *path, const Scene *scene, const mask entering)
 {

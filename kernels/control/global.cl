@@ -1,8 +1,7 @@
 /*---
 title: One control and one majorant of the residual for the whole medium
 uses: [control/collide]
-state:
-  control: real
+state: {control: real}
 ---*/
 static void walk_begin(Path *path, const Scene *scene)
 {

@@ -1,7 +1,6 @@
 /*---
 title: Directions that are chosen with a light in mind
-state:
-  aim: real
+state: {aim: real}
 ---*/
 /* Where a path goes on to: with the chance path->state.aim by the angle to the light, of which what a second
    vertex may add is (pi - angle) / sin(angle) to every solid angle; else as the phase function has it. */

@@ -8,12 +8,10 @@ static Vector mapped(const SCALAR *m, const Vector v)
 
 static Vector heading(const Path *path, const Scene *scene)
 {
-    Vector ahead = mapped(scene->space.to_world, path->ray.direction);
+    const Vector ahead = mapped(scene->space.to_world, path->ray.direction);
     const real inverse = rsqrt(dot_of(ahead, ahead));
-    ahead.x *= inverse;
-    ahead.y *= inverse;
-    ahead.z *= inverse;
-    return ahead;
+    const Vector unit = {ahead.x * inverse, ahead.y * inverse, ahead.z * inverse};
+    return unit;
 }
 
 static real way_to_face(const real at, const real direction, const SCALAR extent)

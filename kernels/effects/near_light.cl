@@ -1,8 +1,6 @@
 /*---
 title: Distances that are chosen with a light in mind
-state:
-  reach: real
-  density: real
+state: {reach: real, density: real}
 ---*/
 /* Where a ray passes the point light, and the density of distances that the light sees under equal angles. */
 typedef struct {

@@ -1,8 +1,6 @@
 /*---
 title: Paths go on in a new direction
-state:
-  scatterings: index
-  first_ray: Ray
+state: {scatterings: index, first_ray: Ray}
 ---*/
 /* Lanes `here` have collided; those that may scatter there. */
 static mask scatters(const Path *path, const Scene *scene, const mask here)

@@ -1,14 +1,6 @@
 /*---
 title: A lane is on its path or on a shadow ray
-state:
-  shadow: mask
-  waiting: mask
-  worth: real
-  held_rng: Rng
-held:
-  ray: Ray
-  t: real
-  weight: real
+state: {shadow: mask, waiting: mask, worth: real, held_rng: Rng}
 ---*/
 /* A lane that collides flies a shadow ray next, and then goes on where it was: no other lane waits for it, and a
    step's lookup serves the lanes of both modes. hold_path and resume_path keep the path meanwhile. */

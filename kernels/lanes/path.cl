@@ -32,7 +32,6 @@ static void take_flight(Path *into, const Path *from, const mask where)
     into->steps = choose(where, from->steps, into->steps);
     into->lookups = choose(where, from->lookups, into->lookups);
     into->crossings = choose(where, from->crossings, into->crossings);
-    into->violations = choose(where, from->violations, into->violations);
     take_state(&into->state, &from->state, where);
 }
 

@@ -27,7 +27,6 @@ typedef JOIN(int, LANES) bits_mask;
 typedef JOIN(INTEGER, 2) mask2;
 typedef JOIN(INTEGER, 4) mask4;
 typedef JOIN(INTEGER, 8) mask8;
-
 typedef JOIN(INTEGER, 16) mask16;
 static int any_lane2(const mask2 m) { return (m.x | m.y) != 0; }
 static int any_lane4(const mask4 m) { return any_lane2(m.lo | m.hi); }

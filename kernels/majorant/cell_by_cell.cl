@@ -30,8 +30,7 @@ static mask fly_through(Path *path, const Scene *scene, const real whole_draw)
     return here;
 }
 
-/* Every live lane goes on to its next tentative collision or leaves; returns those now at one. path->majorant_flown
-   is the majorant's optical depth flown. */
+/* Every live lane goes on to its next tentative collision or leaves; returns those now at one. */
 static mask next_tentative(Path *path, const Scene *scene, Rng *rng)
 {
     return fly_through(path, scene, exponential(rng));

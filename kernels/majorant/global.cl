@@ -8,8 +8,8 @@ static void walk_begin(Path *path, const Scene *scene)
     path->mean_free_path = choose(less((real)0, path->majorant), (SCALAR)1 / path->majorant, (real)FAR);
 }
 
-/* Every live lane goes on to its next tentative collision or leaves; returns those now at one. A majorant of 0 leaves no optical depth that a draw could stay below,
-   not even a draw of 0. */
+/* Every live lane goes on to its next tentative collision or leaves; returns those now at one. A majorant of 0
+   leaves no optical depth that a draw could stay below, not even a draw of 0. */
 static mask next_tentative(Path *path, const Scene *scene, Rng *rng)
 {
     const real draw = exponential(rng);

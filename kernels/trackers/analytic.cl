@@ -2,10 +2,6 @@
 title: Analytic inversion of the CDF
 estimands: [transmittance, free_path, radiance, path_length]
 needs: [closed_form]
-channels: 1
-bounding: false
-unbiased: true
-parameters: {}
 citation: Novak, Georgiev, Hanika, Jarosz 2018, Monte Carlo methods for volumetric light transport simulation
 ---*/
 /* Solves tau(t) = -log(1 - u) in closed form. As an estimate of transmittance it is exp(-tau), exactly. */

@@ -5,9 +5,7 @@ needs: [majorant, light]
 bounding: true
 parameters:
   share: {default: 0.5, above: 0, below: 1, meaning: chance of an equiangular distance}
-state:
-  angular: mask
-  rate: real
+state: {angular: mask, rate: real}
 citation: >-
   Veach, Guibas 1995, Optimally combining sampling techniques for Monte Carlo rendering; Kulla, Fajardo 2012,
   Importance sampling techniques for path tracing in participating media

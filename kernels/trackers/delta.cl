@@ -2,10 +2,7 @@
 title: Delta tracking
 estimands: [transmittance, free_path, radiance, path_length]
 needs: [majorant]
-channels: 1
 bounding: true
-unbiased: true
-parameters: {}
 citation: >-
   Woodcock, Murphy, Hemmings, Longworth 1965, Techniques used in the GEM code for Monte Carlo neutronics
   calculations; Raab, Seibert, Keller 2008, Unbiased global illumination with participating media

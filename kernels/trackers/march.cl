@@ -2,8 +2,6 @@
 title: Ray marching
 estimands: [transmittance, free_path]
 needs: []
-channels: 1
-bounding: false
 unbiased: false
 parameters:
   step: {unit: length, default: 0.01, above: 0, meaning: length of a step}

@@ -3,8 +3,7 @@ title: Next-flight delta tracking
 estimands: [transmittance]
 needs: [majorant]
 bounding: true
-state:
-  total: real
+state: {total: real}
 citation: >-
   Cramer 1978, Application of the fictitious scattering model for deep-penetration Monte Carlo
   calculations; Novak, Georgiev, Hanika, Jarosz 2018, section 4.2

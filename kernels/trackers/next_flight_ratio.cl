@@ -2,9 +2,7 @@
 title: Next-flight ratio tracking
 estimands: [transmittance]
 needs: [majorant]
-state:
-  survival: real
-  total: real
+state: {survival: real, total: real}
 citation: >-
   Cramer 1978, Application of the fictitious scattering model for deep-penetration Monte Carlo
   calculations; Novak, Georgiev, Hanika, Jarosz 2018, section 4.2
@@ -23,8 +21,7 @@ static void begin(Path *path, const Scene *scene, Rng *rng)
 static void at_tentative(Path *path, const Scene *scene, Rng *rng, const mask here, const real sigma_t)
 {
     const real sigma_n = path->majorant - sigma_t;
-    const real null = sigma_n / path->majorant;
-    const real survival = path->state.survival * null;
+    const real survival = path->state.survival * (sigma_n / path->majorant);
     path->state.survival = choose(here, survival, path->state.survival);
     const real ahead = majorant_depth_ahead(path, scene, path->state.total, here);
     splat(path, survival * exp(-ahead), path->ray.length, (mask)-1, here);

@@ -8,11 +8,7 @@ parameters:
     minimum: 0
     below: 1
     meaning: share of the Poisson mass whose terms are all evaluated, before Russian roulette
-state:
-  total: real
-  term: real
-  log_mass: real
-  summed: real
+state: {total: real, term: real, log_mass: real, summed: real}
 citation: >-
   Georgiev, Misso, Hachisuka, Nowrouzezahrai, Krivanek, Jarosz 2019, Integral formulations of volumetric
   transmittance, section 5

@@ -2,10 +2,6 @@
 title: Ratio tracking
 estimands: [transmittance]
 needs: [majorant]
-channels: 1
-bounding: false
-unbiased: true
-parameters: {}
 citation: Novak, Selle, Jarosz 2014, Residual ratio tracking for estimating attenuation in participating media
 ---*/
 /* No collision is real: the weight is the product of the null probabilities sigma_n / majorant. Where the

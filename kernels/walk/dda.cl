@@ -1,9 +1,6 @@
 /*---
 title: Walk through the cells of a regular grid (Amanatides and Woo 1987)
-state:
-  first: Vector
-  delta: Vector
-  crossed: Vector
+state: {first: Vector, delta: Vector, crossed: Vector}
 ---*/
 /* The n-th plane of an axis is met at first + n delta: one rounding however many were crossed, where a
    running sum would drift. A ray along a plane never meets that axis (FAR), nor does one that rounding
@@ -38,8 +35,8 @@ static Indices dda_begin(Path *path, const Vector where, const Vector velocity, 
 
 static Vector dda_next(const State *walk)
 {
-    const Vector next = {walk->first.x + walk->crossed.x * walk->delta.x, walk->first.y + walk->crossed.y * walk->delta.y,
-                         walk->first.z + walk->crossed.z * walk->delta.z};
+    const Vector first = walk->first, n = walk->crossed, delta = walk->delta;
+    const Vector next = {first.x + n.x * delta.x, first.y + n.y * delta.y, first.z + n.z * delta.z};
     return next;
 }
 

@@ -1,9 +1,7 @@
 /*---
 title: The walk through a regular grid of majorants, by DDA
 uses: [walk/dda, walk/in_cells]
-state:
-  cell: index
-  stride: Indices
+state: {cell: index, stride: Indices}
 ---*/
 /* majorant_data has one more layer of cells on every side, a copy of its neighbour: a plane that rounding
    puts just inside the end of the ray leads there and not into another row. */

@@ -1,11 +1,7 @@
 /*---
 title: The walk through the leaves of an octree of majorants
 uses: [walk/in_cells]
-state:
-  cell: Indices
-  leaf_size: index
-  pace: Vector
-  exit: Vector
+state: {cell: Indices, leaf_size: index, pace: Vector, exit: Vector}
 ---*/
 /* The leaves are stored in a grid of the finest cells, each with the size of its leaf: finding a neighbour is
    one load and no descent. majorant_data has majorants, sizes and, where there are any, controls. What holds for
