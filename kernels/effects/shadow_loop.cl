@@ -5,8 +5,10 @@ static void light_directly(Path *path, const Scene *scene, const Rng *rng, const
     Path shadow;
     Rng shadow_rng;
     const real worth = face_light(path, scene, rng, &shadow, &shadow_rng, lit);
-    for (int step = 0; step < SHADOW_STEPS && any_lane(shadow.live); ++step)
+    for (int step = 1; step <= SHADOW_STEPS && any_lane(shadow.live); ++step) {
+        shadow.steps = (index)step; /* which trackers that march count by */
         shadow_step(&shadow, scene, &shadow_rng);
+    }
     path->lookups = shadow.lookups;
     path->crossings = shadow.crossings;
     path->violations = shadow.violations;

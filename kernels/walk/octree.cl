@@ -1,7 +1,7 @@
 /*---
 title: The walk through the leaves of an octree of majorants
 uses: [walk/in_cells]
-state: {cell: Indices, leaf_size: index, pace: Vector, exit: Vector}
+state: {cell: Indices, leaf_size: index, plane_pace: Vector, leaf_exits: Vector}
 ---*/
 /* The leaves are stored in a grid of the finest cells, each with the size of its leaf: finding a neighbour is
    one load and no descent. majorant_data has majorants, sizes and, where there are any, controls. What holds for
@@ -51,11 +51,11 @@ static void enter_leaf(Path *path, const Scene *scene, const mask entering)
     const SCALAR n = scene->majorant.resolution;
     const index size = to_index(cell_value(path, scene, 1));
     const Vector where = in_cells(path->ray.origin, scene);
-    const Vector exit = {leaf_exit(path->t, walk->cell.x, size, where.x, walk->pace.x, n),
-                         leaf_exit(path->t, walk->cell.y, size, where.y, walk->pace.y, n),
-                         leaf_exit(path->t, walk->cell.z, size, where.z, walk->pace.z, n)};
+    const Vector exit = {leaf_exit(path->t, walk->cell.x, size, where.x, walk->plane_pace.x, n),
+                         leaf_exit(path->t, walk->cell.y, size, where.y, walk->plane_pace.y, n),
+                         leaf_exit(path->t, walk->cell.z, size, where.z, walk->plane_pace.z, n)};
     walk->leaf_size = choose(entering, size, walk->leaf_size);
-    take_vector(&walk->exit, &exit, entering);
+    take_vector(&walk->leaf_exits, &exit, entering);
 }
 
 static void cells_enter(Path *path, const Scene *scene)
@@ -64,13 +64,13 @@ static void cells_enter(Path *path, const Scene *scene)
     const SCALAR n = scene->majorant.resolution;
     const real length = path->ray.length;
     const Vector where = in_cells(path->ray.origin, scene), velocity = in_cells(path->ray.direction, scene);
-    walk->pace.x = enter_axis(where.x, velocity.x, length, n, &walk->cell.x);
-    walk->pace.y = enter_axis(where.y, velocity.y, length, n, &walk->cell.y);
-    walk->pace.z = enter_axis(where.z, velocity.z, length, n, &walk->cell.z);
+    walk->plane_pace.x = enter_axis(where.x, velocity.x, length, n, &walk->cell.x);
+    walk->plane_pace.y = enter_axis(where.y, velocity.y, length, n, &walk->cell.y);
+    walk->plane_pace.z = enter_axis(where.z, velocity.z, length, n, &walk->cell.z);
     enter_leaf(path, scene, (mask)-1);
 }
 
-static real next_plane(const Path *path, const Scene *scene) { return least_of(path->state.exit); }
+static real next_plane(const Path *path, const Scene *scene) { return least_of(path->state.leaf_exits); }
 
 /* Along the axes whose plane is met the next cell follows from the leaf, exactly, so a walk cannot stall; along
    the others it is where the ray is, held inside the leaf. */
@@ -88,9 +88,9 @@ static void cross_plane(Path *path, const Scene *scene, const real plane, const 
     State *walk = &path->state;
     const index size = walk->leaf_size;
     const Vector where = in_cells(place_on(&path->ray, plane), scene);
-    const Indices next = {next_cell(walk->cell.x, size, plane, walk->exit.x, walk->pace.x, where.x),
-                          next_cell(walk->cell.y, size, plane, walk->exit.y, walk->pace.y, where.y),
-                          next_cell(walk->cell.z, size, plane, walk->exit.z, walk->pace.z, where.z)};
+    const Indices next = {next_cell(walk->cell.x, size, plane, walk->leaf_exits.x, walk->plane_pace.x, where.x),
+                          next_cell(walk->cell.y, size, plane, walk->leaf_exits.y, walk->plane_pace.y, where.y),
+                          next_cell(walk->cell.z, size, plane, walk->leaf_exits.z, walk->plane_pace.z, where.z)};
     take_indices(&walk->cell, &next, crossing);
     enter_leaf(path, scene, crossing);
     count(path->crossings, crossing);

@@ -101,3 +101,25 @@ def test_a_tracker_of_shadow_rays_brings_the_mathematics_that_it_uses(rig):
     flight = radiance(rig, medium, light=POINT, scatterings=1, shadow="unbiased_march")
     assert "symmetric_means" in flight.runner.program.source.text
     check_mean(flight.run(4096).moments, flight.reference(), 1e-4)
+
+
+def test_a_shadow_ray_may_march(rig):
+    """A parameter of its is called `step`, which is a function of OpenCL, and of PoCL a macro."""
+    medium = {"homogeneous": {"sigma_t": 2.0, "albedo": 0.8}}
+    lit = {"medium": medium, "light": POINT, "scatterings": 1, "lanes": 1}
+    marched, exact = (
+        radiance(rig, shadow=shadow, **lit).record(32).score for shadow in ("march", "regular")
+    )
+    np.testing.assert_allclose(marched, exact, rtol=1e-4, atol=1e-6)
+    assert exact.max() > 0
+
+
+def test_a_tracker_and_the_same_for_shadow_rays_have_choices_of_their_own(rig):
+    """A path by analog collisions has weight 1 whatever its shadow rays have."""
+    medium = {"cloud": GRID["cloud"] | {"sigma_t": 10, "albedo": 0.9}}
+    analog, free = ({"weighted_delta": {"probability": p}} for p in ("analog", "abs_null"))
+    axes = {"light": POINT, "majorant": "grid", "tightness": 3, "lanes": 1, "scatterings": 1}
+    one = radiance(rig, medium, tracker=analog, shadow=free, **axes).record(32)
+    other = radiance(rig, medium, tracker="delta", shadow=free, **axes).record(32)
+    np.testing.assert_allclose(one.score, other.score, rtol=1e-4, atol=1e-6)
+    assert len(np.unique(one.score)) > 10
