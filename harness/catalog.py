@@ -115,14 +115,15 @@ class Channels(Rule):
         return "any or an integer >= 1"
 
 
+Needs = Annotated[frozenset[Annotated[str, Choice(NEEDS)]], OneOrMore(optional=True)]
+
+
 class FrontMatter(Model):
     """The YAML in the first comment of a tracker's file."""
 
     title: Annotated[str, Text()]
     estimands: Annotated[tuple[Annotated[str, Choice(ESTIMANDS)], ...], OneOrMore()]
-    needs: Annotated[frozenset[Annotated[str, Choice(NEEDS)]], OneOrMore(optional=True)] = (
-        frozenset()
-    )
+    needs: Needs = frozenset()
     channels: Annotated[int | str, Channels()] = 1
     """How many it follows; ANY for as many as the medium has, each with a weight of its own."""
     majorants: Annotated[tuple[Annotated[str, Choice(tuple(MAJORANTS))], ...], OneOrMore()] = tuple(

@@ -37,10 +37,7 @@ class Effects:
     channels: int
     chromatic: bool
     phase: str
-    near_light: bool = False
-    """Whether the tracker chooses distances with the light in mind."""
-    aims: bool = False
-    """Whether it chooses directions so too."""
+    tracker: TrackerFile
     shadow: TrackerFile | None = None
     modes: bool = False
     """Whether a lane is on its path or on a shadow ray; else these are flown in an inner loop."""
@@ -73,7 +70,7 @@ class Effects:
     @property
     def state(self) -> dict[str, str]:
         """What a path carries for its effects."""
-        near = ["effects/near_light"] if self.near_light else []
+        near = ["effects/near_light"] if "light" in self.tracker.needs else []
         files = [kernel_files.read(name) for name in [*near, *self._after]]
         state = {name: kind for file in files for name, kind in file.state.items()}
         return state | {f"held_{name}": kind for name, (kind, _) in self._held.items()}
@@ -86,7 +83,7 @@ class Effects:
         held |= {name: (kind, f"path->state.{name}") for name, kind in channels.items()}
         return held if self.modes else {}
 
-    def around(self, tracker: TrackerFile, *, exact: bool) -> list[KernelFile]:
+    def around_tracker(self, *, exact: bool) -> list[KernelFile]:
         """The tracker's files with those of the effects before and behind them."""
         before = []
         if "scattering" in self:
@@ -95,11 +92,13 @@ class Effects:
         if "space" in self.values:
             before.append("effects/direction")
         if "scattering" in self:
-            before += ["effects/near_light"] if self.near_light else []
-            before += ["effects/angle_table"] if self.aims and self.phase != "isotropic" else []
+            before += ["effects/near_light"] if "light" in self.tracker.needs else []
+            before += (
+                ["effects/angle_table"] if self.tracker.aims and self.phase != "isotropic" else []
+            )
             before.append(f"effects/{self._ended_by}")
         files = [kernel_files.read(name) for name in before]
-        files += tracker.files("flight", step=not self.modes)
+        files += self.tracker.files("flight", step=not self.modes)
         if self.shadow:
             files.append(kernel_files.read("effects/shadow"))
             files += self.shadow.files("shadow", step=not self.modes)
@@ -113,7 +112,7 @@ class Effects:
         order += ("point_light", "scattering")
         after = [f"effects/{name}" for name in order if name in self]
         if "scattering" in self:
-            direction = "aimed_direction" if self.aims else "new_direction"
+            direction = "aimed_direction" if self.tracker.aims else "new_direction"
             after[-1:-1] = ["effects/around", f"effects/{direction}", f"effects/{self._until}"]
         if self.modes:
             after.append("effects/shadow_mode")
@@ -217,8 +216,7 @@ def of_scene(
         channels=channels,
         chromatic=chromatic or channels > 1,
         phase=phase,
-        near_light="light" in tracker.needs,
-        aims=tracker.aims,
+        tracker=tracker,
         shadow=shadow if "point_light" in names else None,
         modes=bool(shares) and modes_pay(medium.kernel, channels) and "point_light" in names,
         values=_values(case, medium, names, channels),

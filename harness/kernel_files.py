@@ -63,6 +63,7 @@ class TrackerFile:
     state: tuple[tuple[str, str], ...] = ()
     uses: tuple[str, ...] = ()
     aims: bool = False
+    """Whether it chooses directions with the light in mind."""
 
     @property
     def at_tentative(self) -> bool:

@@ -93,8 +93,8 @@ def compose(structure: Structure) -> Source:
     middle += [f"medium/{structure.medium}", "lanes/path"]
     files = [*(kernel_files.read(name) for name in middle), channels, *walks]
     parts += _named(_as_stored(file, structure) for file in files)
-    tracker, paths, exact = structure.tracker, structure.paths, structure.arithmetic == "double"
-    parts += _named(paths.around(tracker, exact=exact) if paths else tracker.files())
+    paths, exact = structure.paths, structure.arithmetic == "double"
+    parts += _named(paths.around_tracker(exact=exact) if paths else structure.tracker.files())
     record = "record/samples" if structure.record else "record/nothing"
     parts += _named(kernel_files.read(name) for name in ("lanes/tally", record, "main"))
     return Source("\n".join(parts), BUILD_OPTIONS[structure.arithmetic])

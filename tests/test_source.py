@@ -227,6 +227,7 @@ def radiance(**changes):
         channels=1,
         chromatic=False,
         phase="isotropic",
+        tracker=tracker,
         values={"optics": {"albedo": [0.5], "scatterings": 1}} | space,
         **changes,
     )
