@@ -26,7 +26,8 @@ static real score_of(const Path *path, const int channel)
 /* Lanes `where` score a part of their weight as if the flight ended at t, and fly on. */
 static void splat(Path *path, const real weight, const real t, const mask escaped, const mask where)
 {
-    collect(path, 0, score(weight, t, escaped), where);
+    const real part = score(weight, t, escaped);
+    path->state.collected = choose(where, path->state.collected + part, path->state.collected);
 }
 
 /* The extinction at a tentative collision. What exceeds the majorant by more than the rounding of an
