@@ -112,14 +112,3 @@ def test_a_shadow_ray_may_march(rig):
     )
     np.testing.assert_allclose(marched, exact, rtol=1e-4, atol=1e-6)
     assert exact.max() > 0
-
-
-def test_a_tracker_and_the_same_for_shadow_rays_have_choices_of_their_own(rig):
-    """A path by analog collisions has weight 1 whatever its shadow rays have."""
-    medium = {"cloud": GRID["cloud"] | {"sigma_t": 10, "albedo": 0.9}}
-    analog, free = ({"weighted_delta": {"probability": p}} for p in ("analog", "abs_null"))
-    axes = {"light": POINT, "majorant": "grid", "tightness": 3, "lanes": 1, "scatterings": 1}
-    one = radiance(rig, medium, tracker=analog, shadow=free, **axes).record(32)
-    other = radiance(rig, medium, tracker="delta", shadow=free, **axes).record(32)
-    np.testing.assert_allclose(one.score, other.score, rtol=1e-4, atol=1e-6)
-    assert len(np.unique(one.score)) > 10
