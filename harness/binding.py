@@ -12,6 +12,7 @@ import numpy as np
 from freepath import effects, limits, majorants, source
 from freepath.catalog import ANY, Catalog, Tracker
 from freepath.device import Device, DeviceInfo, Program, scalar_type
+from freepath.kernel_files import TrackerFile
 from freepath.majorants import Majorant
 from freepath.path_axes import weights_grow
 from freepath.plan import Case
@@ -152,31 +153,17 @@ def structure_of(
     record: bool = False,
 ) -> Structure:
     """Decide what the source of a case consists of."""
-    tracker = catalog.trackers[case.tracker]
-    numbers, choices = _declared(tracker, case.params)
-    majorant = case.majorant.kind if case.majorant else None
-    chromatic = tracker.channels == ANY
-    paths = None
+    tracker = _composed(catalog.trackers[case.tracker], case.params)
+    chromatic, paths = catalog.trackers[case.tracker].channels == ANY, None
     if case.light is not None:
-        shadow_tracker = catalog.trackers[case.shadow.kind] if case.shadow else None
-        paths = effects.of_scene(
-            case,
-            medium,
-            tracker,
-            _shadow(case, catalog),
-            chromatic=chromatic,
-            shares=bool(shadow_tracker and tracker.shares_lookup and shadow_tracker.shares_lookup),
-        )
-    shadow = paths.shadow if paths else None
-    needs = tracker.needs | (shadow.needs if shadow else frozenset())
+        light = case.shadow
+        shadow = _composed(catalog.trackers[light.kind], light.parameters()) if light else None
+        paths = effects.of_scene(case, medium, tracker, shadow, chromatic=chromatic)
+    needs = tracker.needs | (paths.shadow.needs if paths and paths.shadow else frozenset())
+    majorant = case.majorant.kind if case.majorant else None
     return Structure(
-        tracker=tracker.name,
-        tracker_code=tracker.code,
+        tracker=tracker,
         needs=needs,
-        tracker_numbers=numbers,
-        tracker_state=tuple(tracker.state.items()),
-        tracker_uses=(*tracker.uses, *(shadow.uses if shadow else ())),
-        choices=choices,
         estimand=case.estimand,
         medium=medium.kernel,
         medium_numbers=tuple(medium.numbers),
@@ -194,25 +181,13 @@ def structure_of(
     )
 
 
-def _declared(
-    tracker: Tracker, given: Mapping[str, Any]
-) -> tuple[tuple[str, ...], tuple[effects.Chosen, ...]]:
-    """The parameters that a kernel reads as numbers, and those that are defines."""
-    read = {name: p for name, p in tracker.parameters.items() if not p.host}
-    numbers = tuple(name for name, p in read.items() if p.choices is None)
-    chosen = {name: p.choices for name, p in read.items() if p.choices is not None}
-    return numbers, tuple((n, str(given[n]), tuple(map(str, c))) for n, c in chosen.items())
-
-
-def _shadow(case: Case, catalog: Catalog) -> effects.Shadow | None:
-    """The tracker of the shadow rays of a case."""
-    if case.shadow is None:
-        return None
-    tracker = catalog.trackers[case.shadow.kind]
-    numbers, choices = _declared(tracker, case.shadow.parameters())
-    state = tuple(tracker.state.items())
-    declared = numbers, choices, state, tracker.uses
-    return effects.Shadow(tracker.name, tracker.code, tracker.needs, *declared)
+def _composed(tracker: Tracker, given: Mapping[str, Any]) -> TrackerFile:
+    """A tracker with its parameters, which are numbers that a kernel reads, or defines."""
+    read = {name: p.choices for name, p in tracker.parameters.items() if not p.host}
+    numbers = tuple(name for name, choices in read.items() if choices is None)
+    chosen = tuple((n, str(given[n]), tuple(map(str, c))) for n, c in read.items() if c is not None)
+    same = {name: getattr(tracker, name) for name in ("name", "code", "needs", "uses", "aims")}
+    return TrackerFile(**same, numbers=numbers, choices=chosen, state=tuple(tracker.state.items()))
 
 
 def runner_of(

@@ -8,7 +8,7 @@ import json
 import re
 import sys
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -21,7 +21,7 @@ from freepath.config.quantity import UNITS, Number
 from freepath.config.rules import Choice, Flag, OneOrMore, Rule, Text, expected, failure
 from freepath.config.schema import json_schema
 from freepath.errors import CatalogError, ConfigError, Problem
-from freepath.kernel_files import split_front_matter
+from freepath.kernel_files import CONTRACT, functions, split_front_matter
 from pydantic import ValidationInfo, create_model, field_validator
 
 NEEDS = ("majorant", "control", "closed_form", "cells", "light")
@@ -115,26 +115,43 @@ class Channels(Rule):
         return "any or an integer >= 1"
 
 
+Needs = Annotated[frozenset[Annotated[str, Choice(NEEDS)]], OneOrMore(optional=True)]
+
+
 class FrontMatter(Model):
     """The YAML in the first comment of a tracker's file."""
 
     title: Annotated[str, Text()]
     estimands: Annotated[tuple[Annotated[str, Choice(ESTIMANDS)], ...], OneOrMore()]
-    needs: Annotated[tuple[Annotated[str, Choice(NEEDS)], ...], OneOrMore(optional=True)] = ()
+    needs: Needs = frozenset()
     channels: Annotated[int | str, Channels()] = 1
+    """How many it follows; ANY for as many as the medium has, each with a weight of its own."""
     majorants: Annotated[tuple[Annotated[str, Choice(tuple(MAJORANTS))], ...], OneOrMore()] = tuple(
         MAJORANTS
     )
     bounding: Annotated[bool | dict[str, tuple[Any, ...]], Bounding()] = False
+    """Whether it is only right where the majorant bounds; or for which choices of a parameter."""
     escapes: Annotated[bool, Flag()] = True
+    """Whether a flight may leave the medium: one that never does meets no environment."""
     aims: Annotated[bool, Flag()] = False
+    """Whether directions are chosen with the light in mind too, by effects/aimed_direction."""
     single_flight: Annotated[bool | dict[str, tuple[Any, ...]], Bounding()] = False
-    shares_lookup: Annotated[bool, Flag()] = False
+    """Whether, or for which choices, what it scores on its way is for no path that goes on."""
+    shares_lookup: Any = None
     unbiased: Annotated[bool, Flag()] = True
     parameters: dict[str, Parameter] = {}
     uses: Annotated[tuple[Annotated[str, Choice(USES)], ...], OneOrMore(optional=True)] = ()
     state: dict[str, Annotated[str, Text("real, mask or index, or an array of them", STATE)]] = {}
-    citation: Annotated[str, Text()] | None = None
+    """Fields that a path carries for this tracker: their names and types."""
+    citation: Annotated[str, Text()] = ""
+
+    @field_validator("shares_lookup", mode="before")
+    @classmethod
+    def _gone(cls, _: Any) -> Any:
+        what = (
+            "leave it out: a tracker that defines at_tentative in place of step shares its lookup"
+        )
+        raise failure(f"expected no such key any more; {what} (kernels/README.md)")
 
     @field_validator("parameters", "state", mode="before")
     @classmethod
@@ -150,8 +167,7 @@ class FrontMatter(Model):
         return fields
 
 
-@dataclass(frozen=True)
-class Tracker:
+class Tracker(FrontMatter):
     """A tracker: the front matter of its file, its code, and the file's whole text."""
 
     name: str
@@ -159,29 +175,8 @@ class Tracker:
     source: str
     code: str
     """The text with empty lines for the front matter: line numbers are those of the file."""
-    title: str
-    estimands: tuple[str, ...]
-    needs: frozenset[str]
-    channels: int | str
-    """How many it follows; ANY for as many as the medium has, each with a weight of its own."""
-    majorants: tuple[str, ...]
-    bounding: bool | dict[str, tuple[Any, ...]]
-    """Whether it is only right where the majorant bounds; or for which choices of a parameter."""
-    escapes: bool
-    """Whether a flight may leave the medium: one that never does meets no environment."""
-    aims: bool
-    """Whether directions are chosen with the light in mind too, by effects/aimed_direction."""
-    single_flight: bool | dict[str, tuple[Any, ...]]
-    """Whether, or for which choices, what it scores on its way is for no path that goes on."""
-    shares_lookup: bool
-    """Whether lanes on paths and on shadow rays may share a step's collision and its lookup."""
-    unbiased: bool
-    parameters: dict[str, Parameter]
-    state: dict[str, str]
-    """Fields that a path carries for this tracker: their names and types."""
-    uses: tuple[str, ...]
-    citation: str
-    model: type[Kind] = field(repr=False)
+    model: type[Kind]
+    """Of its parameters, as a config may give them."""
 
 
 @dataclass(frozen=True)
@@ -253,28 +248,20 @@ def read(file: Path) -> Tracker:
     if document.data is None:
         raise _bad(file, "expected title and estimands in the front matter, got nothing")
     front: FrontMatter = document.validate(FrontMatter)
-    return Tracker(
-        name=file.stem,
-        path=file,
-        source=source,
-        code=code,
-        title=front.title,
-        estimands=front.estimands,
-        needs=frozenset(front.needs),
-        channels=front.channels,
-        majorants=front.majorants,
-        bounding=front.bounding,
-        escapes=front.escapes,
-        aims=front.aims,
-        single_flight=front.single_flight,
-        shares_lookup=front.shares_lookup,
-        unbiased=front.unbiased,
-        parameters=front.parameters,
-        state=front.state,
-        uses=front.uses,
-        citation=front.citation or "",
-        model=_parameter_model(file.stem, front),
-    )
+    _check_functions(file, code, front)
+    model = _parameter_model(file.stem, front)
+    given = {"name": file.stem, "path": file, "source": source, "code": code, "model": model}
+    return Tracker.model_construct(**dict(front) | given)
+
+
+def _check_functions(file: Path, code: str, front: FrontMatter) -> None:
+    """Raise ConfigError where a tracker cannot be called."""
+    got = [name for name in CONTRACT if name in functions(code)]
+    if got not in (["begin", "step"], ["begin", "at_tentative"], ["at_tentative"]):
+        what = "the functions begin and step, or at_tentative in place of step"
+        raise _bad(file, f"expected {what}, got {' and '.join(got) or 'none'} (kernels/README.md)")
+    if "step" not in got and ("majorant" not in front.needs or "control" in front.needs):
+        raise _bad(file, "expected needs: [majorant], and no control, for at_tentative")
 
 
 def _parameter_model(name: str, front: FrontMatter) -> type[Kind]:

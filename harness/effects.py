@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 from freepath import kernel_files
 from freepath.config.axes import AUTO, UNLIMITED
-from freepath.kernel_files import KernelFile
+from freepath.kernel_files import KernelFile, TrackerFile, taken
 from freepath.path_axes import chance_of_absorption
 
 MOST_SCATTERINGS = (1 << 24) - 1
 """What `unlimited` is in a kernel, which counts in float; far above any path's steps."""
 ALL_CHANNELS = 3
-Chosen = tuple[str, str, tuple[str, ...]]
-"""(parameter, what was chosen, all that can be chosen), each a define of a tracker."""
+HELD = {"ray": "Ray", "t": "real", "weight": "real"}
+"""What a path is at a collision, beside what it has in each channel."""
 SKY_ROWS, SKY_COLUMNS = 64, 128
 """Of the table that an image of the environment is resampled to, without the rows beyond poles."""
 
@@ -30,19 +30,6 @@ def modes_pay(medium: str, channels: int) -> bool:
 
 
 @dataclass(frozen=True)
-class Shadow:
-    """The tracker of shadow rays: its code, and what it declares."""
-
-    name: str
-    code: str
-    needs: frozenset[str]
-    numbers: tuple[str, ...]
-    choices: tuple[Chosen, ...]
-    state: tuple[tuple[str, str], ...]
-    uses: tuple[str, ...]
-
-
-@dataclass(frozen=True)
 class Effects:
     """The effects of a scene along paths, named as `freepath list effects` does."""
 
@@ -50,11 +37,8 @@ class Effects:
     channels: int
     chromatic: bool
     phase: str
-    near_light: bool = False
-    """Whether the tracker chooses distances with the light in mind."""
-    aims: bool = False
-    """Whether it chooses directions so too."""
-    shadow: Shadow | None = None
+    tracker: TrackerFile
+    shadow: TrackerFile | None = None
     modes: bool = False
     """Whether a lane is on its path or on a shadow ray; else these are flown in an inner loop."""
     values: Mapping[str, Mapping[str, Any]] = field(default_factory=dict, hash=False)
@@ -86,36 +70,41 @@ class Effects:
     @property
     def state(self) -> dict[str, str]:
         """What a path carries for its effects."""
-        near = ["effects/near_light"] if self.near_light else []
+        near = ["effects/near_light"] if "light" in self.tracker.needs else []
         files = [kernel_files.read(name) for name in [*near, *self._after]]
-        return {name: kind for file in files for name, kind in file.state.items()}
+        state = {name: kind for file in files for name, kind in file.state.items()}
+        return state | {f"held_{name}": kind for name, (kind, _) in self._held.items()}
 
-    def around(self, tracker: KernelFile, *, exact: bool) -> list[KernelFile]:
-        """The tracker's file with those of the effects before and behind it."""
-        before = ["effects/chromatic" if self.chromatic else "effects/grey"]
+    @property
+    def _held(self) -> dict[str, tuple[str, str]]:
+        """The kind and the place of what a lane keeps of its path while it flies a shadow ray."""
+        channels = kernel_files.read(f"channels/{'several' if self.chromatic else 'one'}").state
+        held = {name: (kind, f"path->{name}") for name, kind in HELD.items()}
+        held |= {name: (kind, f"path->state.{name}") for name, kind in channels.items()}
+        return held if self.modes else {}
+
+    def around_tracker(self, *, exact: bool) -> list[KernelFile]:
+        """The tracker's files with those of the effects before and behind them."""
+        before = []
         if "scattering" in self:
             circle = "math/circle_builtin" if exact else "math/circle_polynomial"
             before += [circle, f"phase/{self.phase}"]
         if "space" in self.values:
             before.append("effects/direction")
         if "scattering" in self:
-            before += ["effects/near_light"] if self.near_light else []
-            before += ["effects/angle_table"] if self.aims and self.phase != "isotropic" else []
+            before += ["effects/near_light"] if "light" in self.tracker.needs else []
+            before += (
+                ["effects/angle_table"] if self.tracker.aims and self.phase != "isotropic" else []
+            )
             before.append(f"effects/{self._ended_by}")
-        names = "effects/mode_names" if self.modes else "effects/flight_names"
-        files = [kernel_files.read(name) for name in [*before, names]]
-        files.append(tracker)
+        files = [kernel_files.read(name) for name in before]
+        files += self.tracker.files("flight", step=not self.modes)
         if self.shadow:
-            files.append(kernel_files.read("effects/shadow_names"))
-            files += [kernel_files.read("effects/shadow_mode_names")] if self.modes else []
-            files.append(KernelFile(f"trackers/{self.shadow.name}.cl", self.shadow.code))
-        after = [kernel_files.read(name) for name in ("effects/own_names", *self._after)]
-        return [
-            *files,
-            *after,
-            KernelFile("hooks", self._hooks()),
-            kernel_files.read("effects/paths"),
-        ]
+            files.append(kernel_files.read("effects/shadow"))
+            files += self.shadow.files("shadow", step=not self.modes)
+        files += [KernelFile("held", self._keeping())] if self.modes else []
+        files += [kernel_files.read(name) for name in self._after]
+        return [*files, KernelFile("hooks", self._hooks()), kernel_files.read("effects/paths")]
 
     @property
     def _after(self) -> list[str]:
@@ -123,7 +112,7 @@ class Effects:
         order += ("point_light", "scattering")
         after = [f"effects/{name}" for name in order if name in self]
         if "scattering" in self:
-            direction = "aimed_direction" if self.aims else "new_direction"
+            direction = "aimed_direction" if self.tracker.aims else "new_direction"
             after[-1:-1] = ["effects/around", f"effects/{direction}", f"effects/{self._until}"]
         if self.modes:
             after.append("effects/shadow_mode")
@@ -142,13 +131,22 @@ class Effects:
         beyond = ("length", "emission", "environment", "environment_image")
         return "until_out" if any(name in self for name in beyond) else "until_last_light"
 
+    def _keeping(self) -> str:
+        """How lanes keep their path and go on with it."""
+        kept = [(kind, at, f"path->state.held_{n}") for n, (kind, at) in self._held.items()]
+        hold = [taken(kind, held, at) for kind, at, held in kept]
+        resume = [taken(kind, at, held) for kind, at, held in kept]
+        both = {"hold_path": hold, "resume_path": resume}
+        given = "Path *path, const mask where"
+        return "\n\n".join(_function(name, given, lines) for name, lines in both.items())
+
     def _hooks(self) -> str:
         """What happens at the beginning of a path and at the end of a flight."""
         scatters = "scattering" in self
         at_begin = ["path->state.scatterings = (index)0;"] if scatters else []
         at_begin += ["path->state.shadow = path->state.waiting = (mask)0;"] if self.modes else []
         # a path may be cut off on a shadow ray
-        over = ["resume_path(path, ended & path->state.shadow);"] if self.modes else []
+        over = ["return_to_path(path, ended & path->state.shadow);"] if self.modes else []
         over += ["restore_ray(path, ended);"] if scatters else []
         at_end = "Path *path, const Scene *scene, Rng *rng, const mask "
         at_end += "stopped" if self.modes else "ended"
@@ -196,17 +194,18 @@ def _function(name: str, parameters: str, lines: list[str]) -> str:
 
 
 def of_scene(
-    case: Any, medium: Any, tracker: Any, shadow: Shadow | None, *, chromatic: bool, shares: bool
+    case: Any, medium: Any, tracker: TrackerFile, shadow: TrackerFile | None, *, chromatic: bool
 ) -> Effects:
-    """Derive the effects of a case in its medium, followed by a tracker of the catalog.
+    """Derive the effects of a case in its medium, followed by a tracker.
 
-    `shares`: whether tracker and shadow can share the lookup of a step. `effects: all` has every
-    effect that this scene could have, switched on with what adds nothing.
+    `effects: all` has every effect that this scene could have, switched on with what adds nothing.
     """
     everything = case.effects == "all"
     count = len(medium.channels)
     channels = ALL_CHANNELS if everything and count == 1 else count
     names = _names(case, shadow, everything=everything)
+    # trackers that decide at a tentative collision can share it and its lookup
+    shares = shadow and tracker.at_tentative and shadow.at_tentative
     phase = "isotropic"
     if case.medium.g or everything:
         phase = "henyey_greenstein"
@@ -217,15 +216,14 @@ def of_scene(
         channels=channels,
         chromatic=chromatic or channels > 1,
         phase=phase,
-        near_light="light" in tracker.needs,
-        aims=tracker.aims,
+        tracker=tracker,
         shadow=shadow if "point_light" in names else None,
-        modes=shares and modes_pay(medium.kernel, channels) and "point_light" in names,
+        modes=bool(shares) and modes_pay(medium.kernel, channels) and "point_light" in names,
         values=_values(case, medium, names, channels),
     )
 
 
-def _names(case: Any, shadow: Shadow | None, *, everything: bool) -> tuple[str, ...]:
+def _names(case: Any, shadow: TrackerFile | None, *, everything: bool) -> tuple[str, ...]:
     """The effects that a scene has, or all that it could have."""
     model, light = case.medium, case.light
     collects = case.estimand != "path_length"

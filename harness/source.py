@@ -8,9 +8,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from freepath import kernel_files
-from freepath.effects import SKY_COLUMNS, SKY_ROWS, Chosen, Effects
+from freepath.config.axes import ALONG_PATHS
+from freepath.effects import SKY_COLUMNS, SKY_ROWS, Effects
 from freepath.errors import CatalogError
-from freepath.kernel_files import KernelFile
+from freepath.kernel_files import KernelFile, TrackerFile, taken
 
 SCALARS = {"strict": "float", "fast": "float", "double": "double"}
 BUILD_OPTIONS = {
@@ -25,11 +26,9 @@ BOX = ("extent_x", "extent_y", "extent_z")
 class Structure:
     """All that decides which source a case has; numbers are kernel arguments and do not."""
 
-    tracker: str
-    tracker_code: str
+    tracker: TrackerFile
     needs: frozenset[str]
-    tracker_numbers: tuple[str, ...]
-    choices: tuple[Chosen, ...]
+    """Of the tracker, and of the one of its shadow rays."""
     estimand: str
     medium: str
     medium_numbers: tuple[str, ...]
@@ -44,11 +43,15 @@ class Structure:
     """Whether a path has a weight for each channel, be it one; or one weight."""
     paths: Effects | None = None
     """What happens along paths that scatter; None where a sample is one flight."""
-    tracker_state: tuple[tuple[str, str], ...] = ()
-    tracker_uses: tuple[str, ...] = ()
     logarithm: str = "polynomial"
     count: bool = False
     record: bool = False
+
+    @property
+    def trackers(self) -> list[TrackerFile]:
+        """The tracker, and that of its shadow rays."""
+        shadow = self.paths.shadow if self.paths else None
+        return [self.tracker, shadow] if shadow else [self.tracker]
 
 
 @dataclass(frozen=True)
@@ -80,18 +83,18 @@ def compose(structure: Structure) -> Source:
     """Concatenate the files of a case, each behind a `#line` that names it to the compiler."""
     parts = [_defines(structure)]
     parts += _named(kernel_files.read(name) for name in _before_structs(structure))
-    walks = _with_uses([*_walks(structure), *structure.tracker_uses])
+    uses = [name for tracker in structure.trackers for name in tracker.uses]
+    walks = _with_uses([*_walks(structure), *uses])
     channels = kernel_files.read(f"channels/{'several' if structure.chromatic else 'one'}")
     parts.append(_structs(structure, [*walks, channels]))
-    middle = [f"estimands/{structure.estimand}", "count/on" if structure.count else "count/off"]
+    estimand = "along_paths" if structure.estimand in ALONG_PATHS else structure.estimand
+    middle = [f"estimands/{estimand}", "count/on" if structure.count else "count/off"]
     middle += ["storage/half"] if structure.storage == "half" else []
     middle += [f"medium/{structure.medium}", "lanes/path"]
     files = [*(kernel_files.read(name) for name in middle), channels, *walks]
     parts += _named(_as_stored(file, structure) for file in files)
-    tracker = KernelFile(f"trackers/{structure.tracker}.cl", structure.tracker_code)
-    paths = structure.paths
-    exact = structure.arithmetic == "double"
-    parts += _named(paths.around(tracker, exact=exact) if paths else [tracker])
+    paths, exact = structure.paths, structure.arithmetic == "double"
+    parts += _named(paths.around_tracker(exact=exact) if paths else structure.tracker.files())
     record = "record/samples" if structure.record else "record/nothing"
     parts += _named(kernel_files.read(name) for name in ("lanes/tally", record, "main"))
     return Source("\n".join(parts), BUILD_OPTIONS[structure.arithmetic])
@@ -101,14 +104,16 @@ def _before_structs(structure: Structure) -> list[str]:
     lanes = "lanes/scalar" if structure.lanes == 1 else "lanes/vector"
     exact = structure.arithmetic == "double" or structure.logarithm == "builtin"
     logarithm = "math/log_builtin" if exact else "math/log_polynomial"
-    return [lanes, "lanes/common", logarithm, "lanes/rng"]
+    return [lanes, "lanes/common", logarithm, "lanes/rng", "lanes/ray"]
 
 
 def _walks(structure: Structure) -> list[str]:
     walks = []
     if "majorant" in structure.needs:
         walk = "control" if "control" in structure.needs else "majorant"
-        walks.append(f"{walk}/{structure.majorant}")
+        cells = structure.majorant != "global"
+        walks += [f"walk/{structure.majorant}"] if cells else []
+        walks.append(f"{walk}/{'cell_by_cell' if cells else 'global'}")
     needed = (need for need in ("closed_form", "cells") if need in structure.needs)
     return walks + [f"{need}/{structure.medium}" for need in needed]
 
@@ -165,11 +170,8 @@ def _defines(structure: Structure) -> str:
         lines += [f"#define SKY_ROWS {SKY_ROWS}", f"#define SKY_COLUMNS {SKY_COLUMNS}"]
     if double:
         lines.insert(0, "#pragma OPENCL EXTENSION cl_khr_fp64 : enable")
-    shadow = structure.paths.shadow if structure.paths else None
-    for parameter, chosen, choices in structure.choices + (shadow.choices if shadow else ()):
-        name = parameter.upper()
-        lines += [f"#define {name}_{choice.upper()} {i}" for i, choice in enumerate(choices)]
-        lines.append(f"#define {name} {name}_{chosen.upper()}")
+    for prefix, tracker in zip(("", "SHADOW_"), structure.trackers, strict=False):
+        lines += tracker.defines(prefix)
     return "\n".join(lines)
 
 
@@ -180,7 +182,7 @@ def _structs(structure: Structure, walks: list[KernelFile]) -> str:
         "medium": structure.medium_numbers,
         "majorant": structure.majorant_numbers if "majorant" in structure.needs else (),
         "channels": ("extinction[CHANNELS]", "largest") if structure.chromatic else (),
-        "tracker": structure.tracker_numbers,
+        "tracker": structure.tracker.numbers,
     }
     if structure.paths:
         groups |= structure.paths.groups
@@ -227,33 +229,25 @@ def _type_of(group: str) -> str:
 def _state(structure: Structure, walks: list[KernelFile]) -> list[str]:
     """Declare what a path carries for its walk and its tracker, and how lanes take it over."""
     state = {name: kind for file in walks for name, kind in file.state.items()}
-    taken = sorted(state.keys() & dict(structure.tracker_state).keys())
-    if taken:
-        message = f"expected a name for its state other than '{taken[0]}', which a walk uses"
-        raise CatalogError(f"trackers/{structure.tracker}.cl: {message}")
-    state |= dict(structure.tracker_state)
     if structure.paths:
         state |= structure.paths.state
-        state |= dict(structure.paths.shadow.state) if structure.paths.shadow else {}
+    for tracker in structure.trackers:
+        for name in sorted(dict(tracker.state).keys() & state.keys()):
+            message = f"expected a name for its state other than '{name}', which freepath uses"
+            raise CatalogError(f"trackers/{tracker.name}.cl: {message}")
+    state |= {name: kind for tracker in structure.trackers for name, kind in tracker.state}
     lines = ["typedef struct {"]
     for name, kind in state.items():
         scalar, bracket, count = kind.replace("spectrum", "real[CHANNELS]").partition("[")
         lines.append(f"    {scalar} {name}{bracket}{count};")
     lines += [
         "} State;",
-        "static void merge_state(State *into, const State *from, const mask where)",
+        "static void take_state(State *into, const State *from, const mask where)",
     ]
     # arrays are scratch that a sample fills as it goes: there is nothing to take over at its start
-    merged = [name for name, kind in state.items() if "[" not in kind and kind != "spectrum"]
-    merges = [f"    into->{name} = choose(where, from->{name}, into->{name});" for name in merged]
-    spectra = [name for name, kind in state.items() if kind == "spectrum"]
-    if spectra:
-        merges.append("    for (int c = 0; c < CHANNELS; ++c) {")
-        merges += [
-            f"        into->{n}[c] = choose(where, from->{n}[c], into->{n}[c]);" for n in spectra
-        ]
-        merges.append("    }")
-    return [*lines, "{", *merges, "}"]
+    kept = {name: kind for name, kind in state.items() if "[" not in kind}
+    takes = [f"    {taken(kind, f'into->{n}', f'from->{n}')}" for n, kind in kept.items()]
+    return [*lines, "{", *takes, "}"]
 
 
 def numbers_of(  # noqa: PLR0913, PLR0917 (one group of the kernel's Numbers each)
@@ -271,7 +265,7 @@ def numbers_of(  # noqa: PLR0913, PLR0917 (one group of the kernel's Numbers eac
         values += [majorant[name] for name in structure.majorant_numbers]
     if structure.chromatic:
         values += [*channels, max(channels)]
-    values += [tracker[name] for name in structure.tracker_numbers]
+    values += [tracker[name] for name in structure.tracker.numbers]
     if structure.paths:
         values += structure.paths.numbers
         if structure.paths.shadow:

@@ -22,13 +22,10 @@ static void next_unit(Tally *tally, Path *path, const mask where, __global uint 
     tally->unit = load_lanes(unit);
     tally_begin(tally, path, where);
     const index ray = larger(tally->unit, (index)0) % (index)(INTEGER)rays * 7;
-    path->origin_x = choose(where, gather(ray_data, ray), path->origin_x);
-    path->origin_y = choose(where, gather(ray_data + 1, ray), path->origin_y);
-    path->origin_z = choose(where, gather(ray_data + 2, ray), path->origin_z);
-    path->direction_x = choose(where, gather(ray_data + 3, ray), path->direction_x);
-    path->direction_y = choose(where, gather(ray_data + 4, ray), path->direction_y);
-    path->direction_z = choose(where, gather(ray_data + 5, ray), path->direction_z);
-    path->length = choose(where, gather(ray_data + 6, ray), path->length);
+    const Ray next = {{gather(ray_data, ray), gather(ray_data + 1, ray), gather(ray_data + 2, ray)},
+                      {gather(ray_data + 3, ray), gather(ray_data + 4, ray), gather(ray_data + 5, ray)},
+                      gather(ray_data + 6, ray)};
+    take_ray(&path->ray, &next, where);
 }
 
 /* Lanes `where` start their next sample. It is begun in full for all lanes and then taken over by those,
@@ -42,30 +39,15 @@ static void next_sample(const Tally *tally, Path *path, Rng *rng, const mask whe
     const index number = block * (index)(INTEGER)samples + tally->done;
     Rng new_rng = stream(seed, to_bits(ray), first_sample, to_bits(number));
     Path new_path = *path;
-    new_path.t = new_path.depth = new_path.target = (real)0;
+    start_flight(&new_path, (mask)-1);
     new_path.weight = (real)1;
     new_path.live = (mask)-1;
     new_path.escaped = (mask)0;
     new_path.steps = (index)0;
     channels_begin(&new_path);
     begin(&new_path, scene, &new_rng);
-    const bits_mask narrow = narrow_mask(where);
-    rng->s0 = choose(narrow, new_rng.s0, rng->s0);
-    rng->s1 = choose(narrow, new_rng.s1, rng->s1);
-    rng->s2 = choose(narrow, new_rng.s2, rng->s2);
-    rng->s3 = choose(narrow, new_rng.s3, rng->s3);
-    path->t = choose(where, new_path.t, path->t);
-    path->depth = choose(where, new_path.depth, path->depth);
-    path->target = choose(where, new_path.target, path->target);
-    path->majorant = choose(where, new_path.majorant, path->majorant);
-    path->mean_free_path = choose(where, new_path.mean_free_path, path->mean_free_path);
-    path->weight = choose(where, new_path.weight, path->weight);
-    path->live = choose(where, new_path.live, path->live);
-    path->escaped = choose(where, new_path.escaped, path->escaped);
-    path->steps = choose(where, new_path.steps, path->steps);
-    path->lookups = choose(where, new_path.lookups, path->lookups);
-    path->crossings = choose(where, new_path.crossings, path->crossings);
-    merge_state(&path->state, &new_path.state, where);
+    take_rng(rng, &new_rng, where);
+    take_flight(path, &new_path, where);
 }
 
 __kernel void track(const ulong seed, const ulong first_sample, const uint samples, const uint units,
@@ -75,7 +57,7 @@ __kernel void track(const ulong seed, const ulong first_sample, const uint sampl
                     __global uint *counters, __global ulong *iterations, __global SCALAR *recorded)
 {
     const Scene scene = make_scene(numbers, medium_data, majorant_data);
-    const Path no_path = {(real)0};
+    const Path no_path = {{{(real)0}}};
     const Tally no_tally = {(index)-1};
     Path path = no_path;
     Tally tally = no_tally;

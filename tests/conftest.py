@@ -26,7 +26,7 @@ SMALL_TRACKERS = {
 
 def tracker_text(front: str, title: str = "A tracker") -> str:
     """Return the text of a tracker's file with this front matter."""
-    return f"/*---\ntitle: {title}\n{front}\n---*/\nstatic void step(void) {{}}\n"
+    return f"/*---\ntitle: {title}\n{front}\n---*/\nvoid begin(void) {{}}\nvoid step(void) {{}}\n"
 
 
 @pytest.fixture(scope="session")

@@ -160,6 +160,42 @@ def test_bad_front_matter(tmp_path, front, line, column, message):
         assert said.splitlines()[1] == "    " + front.splitlines()[line - 2].replace("\t", " ")
 
 
+BOTH = "begin and step, or at_tentative in place of step, got "
+
+
+@pytest.mark.parametrize(
+    ("needs", "defined", "told"),
+    [
+        ("majorant", ["at_tentative"], ""),
+        ("majorant", ["begin", "at_tentative"], ""),
+        ("cells", ["begin", "step"], ""),
+        ("majorant", ["begin", "step", "at_tentative"], f"{BOTH}begin and step and at_tentative"),
+        ("majorant", ["step", "at_tentative"], f"{BOTH}step and at_tentative"),
+        ("majorant", ["begin"], f"{BOTH}begin"),
+        ("majorant", ["step"], f"{BOTH}step"),
+        ("majorant", [], f"{BOTH}none"),
+        ("cells", ["at_tentative"], "needs: [majorant], and no control, for at_tentative"),
+        ("majorant, control", ["at_tentative"], "needs: [majorant], and no control"),
+    ],
+)
+def test_the_functions_that_a_tracker_must_define(tmp_path, needs, defined, told):
+    text = f"/*---\ntitle: x\n{FRONT}\nneeds: [{needs}]\n---*/\n/* void step(Path *path) {{}} */\n"
+    text += "".join(f"static void {name}(Path *path)\n{{\n}}\n" for name in defined)
+    if told:
+        assert complaints(tmp_path, text).startswith("mine.cl:1:1: expected ")
+        assert told in complaints(tmp_path, text)
+    else:
+        assert load_one(tmp_path, text).trackers["mine"].code.strip()
+
+
+def test_a_tracker_of_old_that_shares_lookups_is_told_how_to(tmp_path):
+    said = complaints(tmp_path, tracker_text(f"{FRONT}\nshares_lookup: true"))
+    assert said.startswith(
+        "mine.cl:4:16: shares_lookup: expected no such key any more; leave it out"
+    )
+    assert "defines at_tentative in place of step" in said
+
+
 @pytest.mark.parametrize(
     "text",
     [

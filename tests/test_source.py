@@ -1,19 +1,18 @@
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from freepath import kernel_files, source
 from freepath.effects import Effects
 from freepath.errors import CatalogError
-from freepath.kernel_files import split_front_matter
+from freepath.kernel_files import TrackerFile, functions, split_front_matter
 from freepath.source import Source, Structure, combined_hash, compose, numbers_of
 
+MINE = TrackerFile("mine", "\n\n\n/* line 4 */\nstatic void step(void) {}\n")
 DELTA = {
-    "tracker": "mine",
-    "tracker_code": "\n\n\n/* line 4 */\nstatic void step(void) {}\n",
+    "tracker": MINE,
     "needs": frozenset({"majorant"}),
-    "tracker_numbers": (),
-    "choices": (),
     "estimand": "transmittance",
     "medium": "homogeneous",
     "medium_numbers": ("sigma_t",),
@@ -40,6 +39,7 @@ def test_a_source_has_what_the_case_needs_and_nothing_else():
         "lanes/common.cl",
         "math/log_polynomial.cl",
         "lanes/rng.cl",
+        "lanes/ray.cl",
         "estimands/transmittance.cl",
         "count/off.cl",
         "medium/homogeneous.cl",
@@ -65,7 +65,7 @@ def test_a_source_has_what_the_case_needs_and_nothing_else():
         ({"needs": frozenset()}, set(), {"majorant/global.cl"}),
         (
             {"majorant": "grid", "majorant_numbers": GRID},
-            {"majorant/grid.cl", "walk/dda.cl"},
+            {"majorant/cell_by_cell.cl", "walk/grid.cl", "walk/dda.cl"},
             {"majorant/global.cl"},
         ),
         (
@@ -92,16 +92,16 @@ def test_a_file_that_two_others_use_is_there_once_and_before_them():
     )
     assert both.count('#line 1 "walk/dda.cl"') == 1
     order = files_of(both)
-    assert order.index("walk/dda.cl") < order.index("majorant/grid.cl")
+    assert order.index("walk/dda.cl") < order.index("walk/grid.cl")
     assert order.index("walk/dda.cl") < order.index("cells/grid_trilinear.cl")
 
 
 def test_what_a_tracker_uses_is_there_once_and_before_it():
-    files = files_of(composed(tracker_uses=("math/newton", "math/symmetric_means")))
+    files = files_of(composed(tracker=replace(MINE, uses=("math/newton", "math/symmetric_means"))))
     assert files[-5] == "math/symmetric_means.cl"
     # the walk uses that one too
     by_newton = {"needs": frozenset({"closed_form"}), "medium": "cosine"}
-    files = files_of(composed(tracker_uses=("math/newton",), **by_newton))
+    files = files_of(composed(tracker=replace(MINE, uses=("math/newton",)), **by_newton))
     assert files.count("math/newton.cl") == 1
 
 
@@ -124,7 +124,8 @@ def test_lines_are_numbered_as_in_their_files():
 
 
 def test_numbers_are_declared_in_the_order_in_which_they_are_given():
-    structure = Structure(**DELTA | {"tracker_numbers": ("step",), "medium_numbers": ("a", "b")})
+    tracker = replace(MINE, numbers=("step",))
+    structure = Structure(**DELTA | {"tracker": tracker, "medium_numbers": ("a", "b")})
     declared = re.findall(
         r"typedef struct \{ SCALAR (.+); \} (\w+)Numbers;", compose(structure).text
     )
@@ -144,7 +145,8 @@ def test_a_tracker_without_a_majorant_is_given_no_numbers_of_one():
 
 
 def test_choices_become_defines():
-    text = composed(choices=(("placement", "end", ("start", "end")), ("order", "2", ("1", "2"))))
+    choices = (("placement", "end", ("start", "end")), ("order", "2", ("1", "2")))
+    text = composed(tracker=replace(MINE, choices=choices))
     for line in (
         "#define PLACEMENT_START 0",
         "#define PLACEMENT_END 1",
@@ -155,9 +157,8 @@ def test_choices_become_defines():
 
 
 def test_the_state_of_a_path_is_that_of_its_walk_and_its_tracker():
-    text = composed(
-        majorant="grid", majorant_numbers=GRID, tracker_state=(("best", "real"), ("hit", "mask"))
-    )
+    tracker = replace(MINE, state=(("best", "real"), ("hit", "mask")))
+    text = composed(majorant="grid", majorant_numbers=GRID, tracker=tracker)
     for declared in ("index cell;", "real best;", "mask hit;"):
         assert f"    {declared}\n" in text
     assert "into->best = choose(where, from->best, into->best);" in text
@@ -167,8 +168,9 @@ def test_several_channels_have_a_weight_each():
     text = composed(chromatic=True, channels=3)
     assert "channels/several.cl" in files_of(text)
     assert "#define CHANNELS 3" in text
-    assert "    real tint[CHANNELS];\n" in text
-    assert "into->tint[c] = choose(where, from->tint[c], into->tint[c]);" in text
+    assert "    real throughput[CHANNELS];\n" in text
+    taken = "into->throughput[c] = choose(where, from->throughput[c], into->throughput[c]);"
+    assert taken in text
     structure = Structure(**DELTA | {"chromatic": True, "channels": 3})
     values = numbers_of(structure, [1, 1, 1], {"sigma_t": 2}, {"sigma_t": 3}, [4, 6, 5], {})
     assert values == [1, 1, 1, 2, 3, 4, 6, 5, 6]
@@ -176,7 +178,8 @@ def test_several_channels_have_a_weight_each():
 
 def test_a_tracker_may_not_take_the_state_of_its_walk():
     with pytest.raises(CatalogError, match=r"trackers/mine\.cl: .*'cell'"):
-        composed(majorant="grid", majorant_numbers=GRID, tracker_state=(("cell", "index"),))
+        tracker = replace(MINE, state=(("cell", "index"),))
+        composed(majorant="grid", majorant_numbers=GRID, tracker=tracker)
 
 
 def test_the_hash_tells_sources_and_options_apart():
@@ -217,17 +220,18 @@ def test_a_file_without_front_matter_is_all_code():
 
 def radiance(**changes):
     """A source of radiance with these effects."""
-    names = changes.pop("names")
+    names, tracker = changes.pop("names"), changes.pop("tracker", MINE)
     space = {"space": {"to_world": [1.0] * 9}} if "scattering" in names else {}
     effects = Effects(
         names=names,
         channels=1,
         chromatic=False,
         phase="isotropic",
+        tracker=tracker,
         values={"optics": {"albedo": [0.5], "scatterings": 1}} | space,
         **changes,
     )
-    return composed(estimand="radiance", paths=effects)
+    return composed(estimand="radiance", paths=effects, tracker=tracker)
 
 
 def test_single_flights_have_nothing_of_paths():
@@ -237,9 +241,6 @@ def test_single_flights_have_nothing_of_paths():
 def test_a_source_has_the_effects_that_it_needs_and_no_other():
     bare = files_of(radiance(names=()))
     assert [name for name in bare if name.startswith("effects/")] == [
-        "effects/grey.cl",
-        "effects/flight_names.cl",
-        "effects/own_names.cl",
         "effects/paths.cl",
     ]
     for name in ("emission", "environment"):
@@ -256,6 +257,82 @@ def test_a_source_has_the_effects_that_it_needs_and_no_other():
         "math/circle_polynomial.cl",
         "phase/isotropic.cl",
     }
+
+
+DECIDES = """static real share(const real x) { return x; }
+static void at_tentative(Path *path, const Scene *scene, Rng *rng, const mask here,
+                         const real sigma_t)
+{
+#if MODE == MODE_FAST
+    splat(path, share(scene->tracker.step), path->t, sampled_depth(rng), here);
+#endif
+}
+"""
+CHOICES = (("mode", "fast", ("slow", "fast")),)
+
+
+def test_a_tracker_that_decides_has_the_begin_and_the_step_of_the_walk():
+    names = files_of(composed(tracker=TrackerFile("mine", DECIDES)))
+    after = names.index("trackers/mine.cl")
+    assert names[after : after + 3] == ["trackers/mine.cl", "walk/begin.cl", "walk/step.cl"]
+    own = TrackerFile("mine", f"void begin(void) {{}}\n{DECIDES}")
+    assert "walk/begin.cl" not in files_of(composed(tracker=own))
+    assert "walk/begin.cl" not in files_of(composed()) + files_of(radiance(names=()))
+
+
+def test_functions_have_the_names_by_which_they_are_called():
+    """In the text itself: nothing but what a tracker defines is a macro, and nothing is undone."""
+    own = TrackerFile("mine", DECIDES, choices=CHOICES)
+    other = TrackerFile("mine", DECIDES, choices=(("mode", "slow", ("slow", "fast")),))
+    names = ("point_light", "scattering")
+    for modes in (False, True):
+        text = radiance(names=names, tracker=own, shadow=other, modes=modes)
+        assert "#undef" not in text
+        code = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
+        defined = [name for name in re.findall(r"(?m)^static [^;{}=]*?\b(\w+)\(", code)]
+        assert len(set(defined)) == len(defined)
+        assert {"flight_share", "shadow_share", "begin", "step", "flight_step"} <= set(defined)
+        assert ("shadow_step" in defined) != modes
+        assert "splat(path, flight_share(scene->tracker.step), path->t, sampled_depth(rng)" in text
+        assert (
+            "shadow_splat(path, shadow_share(scene->shadow_tracker.step), path->t, shadow_s" in text
+        )
+        assert "#define MODE MODE_FAST\n" in text
+        assert "#define SHADOW_MODE SHADOW_MODE_SLOW\n" in text
+        assert "#if SHADOW_MODE == SHADOW_MODE_FAST\n" in text
+
+
+def test_a_lane_keeps_its_path_while_it_flies_a_shadow_ray():
+    mine = TrackerFile("mine", DECIDES, choices=CHOICES)
+    given = {"names": ("point_light", "scattering"), "tracker": mine, "shadow": mine}
+    text = radiance(modes=True, **given)
+    for place in ("ray", "t", "weight", "state.collected"):
+        held = f"path->state.held_{place.removeprefix('state.')}"
+        kind, here = ("take_ray(&{}, &{}, where)", f"path->{place}")
+        if place != "ray":
+            kind = "{0} = choose(where, {1}, {0})"
+        assert kind.format(held, here) in text
+        assert kind.format(here, held) in text
+    assert "held_" not in radiance(**given)
+
+
+FUNCTIONS = """/* void no(void) {} */
+static int a(int b) { return b; }
+// int c(void) {
+void d(
+  int e)
+{
+    if (x) {
+    }
+}
+static int later(void);
+else if (z) {
+#define f(x) {
+"""
+
+
+def test_what_a_file_defines():
+    assert functions(FUNCTIONS) == {"a", "d"}
 
 
 def test_paths_know_the_step_cap():

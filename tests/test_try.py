@@ -103,9 +103,14 @@ def test_rejected_with_what_was_measured(call, file, monkeypatch):
 @pytest.mark.parametrize(
     ("old", "new", "code", "told"),
     [
-        ("walk_begin(path", "wlk_begin(path", 8, "newcomer.cl"),
-        ("const real sigma_n =", "const real sigma_n", 8, "newcomer.cl:17"),
-        ("void step(", "void stap(", 2, "newcomer.cl:1:1: expected the function step"),
+        ("collide(path", "colide(path", 8, "newcomer.cl"),
+        ("const real sigma_n =", "const real sigma_n", 8, "newcomer.cl:14"),
+        (
+            "void at_tentative(",
+            "void at_tentativ(",
+            2,
+            "newcomer.cl:1:1: expected the functions begin and step, or at_tentative",
+        ),
         ("maximum: 1", "maximum: abc", 2, "newcomer.cl:8:48: parameters.threshold.maximum"),
         ("---*/", "*/", 2, "newcomer.cl:1:1: expected front matter"),
         ("needs: [majorant]", "needs: [majorent]", 2, "newcomer.cl:4:9: needs[0]"),

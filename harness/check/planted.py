@@ -36,7 +36,7 @@ KERNELS = (
     ),
     Defect(
         "a weight that a path leaves to the next",
-        "path->weight = choose(where, new_path.weight, path->weight);",
+        "into->weight = choose(where, from->weight, into->weight);",
         "",
         f"{ID}/ratio/transmittance/homogeneous/global",
     ),
@@ -79,7 +79,7 @@ KERNELS = (
     ),
     Defect(
         "the control's transmittance left out",
-        "path->weight * exp(-path->depth), path->weight);",
+        "path->weight * exp(-path->control_flown), path->weight);",
         "path->weight, path->weight);",
         f"{ID}/residual_ratio/transmittance/homogeneous/global",
     ),
@@ -97,8 +97,8 @@ KERNELS = (
     ),
     Defect(
         "a next flight from the start of the ray each time",
-        "throughput * exp(-ahead)",
-        "throughput * exp(-path->state.total)",
+        "survival * exp(-ahead)",
+        "survival * exp(-path->state.total)",
         f"{ID}/next_flight_ratio/transmittance/trilinear/grid",
     ),
     Defect(
@@ -109,8 +109,8 @@ KERNELS = (
     ),
     Defect(
         "a term of the series that is lost in part",
-        "deposit(path, mass * state->term, path->length",
-        "deposit(path, mass * state->term * 0.95f, path->length",
+        "splat(path, mass * state->term, path->ray.length",
+        "splat(path, mass * state->term * 0.95f, path->ray.length",
         f"{ID}/p_series_cmf/transmittance/trilinear/grid",
     ),
     Defect(
@@ -121,8 +121,8 @@ KERNELS = (
     ),
     Defect(
         "a comb whose last tooth is left out",
-        "const real length = path->length / state->teeth;",
-        "const real length = path->length / (state->teeth + (SCALAR)1);",
+        "const real length = path->ray.length / state->teeth;",
+        "const real length = path->ray.length / (state->teeth + (SCALAR)1);",
         f"{ID}/unbiased_march/transmittance/homogeneous/global",
     ),
     Defect(
@@ -140,8 +140,8 @@ KERNELS = (
     ),
     Defect(
         "the majorant of the cell beside",
-        "(j + 1) * row + (i + 1);",
-        "j * row + (i + 1);",
+        "(at.y + 1) * row + (at.x + 1);",
+        "at.y * row + (at.x + 1);",
         f"{ID}/delta/free_path/gaussian/grid",
     ),
     Defect(
@@ -152,8 +152,8 @@ KERNELS = (
     ),
     Defect(
         "a walk that steps along the wrong axis",
-        "choose(less(path->direction_y, (real)0), (index)-row, (index)row)",
-        "choose(less(path->direction_y, (real)0), (index)-1, (index)1)",
+        "choose(less(path->ray.direction.y, (real)0), (index)-row, (index)row)",
+        "choose(less(path->ray.direction.y, (real)0), (index)-1, (index)1)",
         DELTA,
     ),
     Defect(
@@ -190,7 +190,7 @@ KERNELS = (
     Defect(
         "the last cell of a ray left out",
         "path->depth = choose(path->live, depth,",
-        "path->depth = choose(path->live & less(t_exit, path->length), depth,",
+        "path->depth = choose(path->live & less(t_exit, path->ray.length), depth,",
         f"{ID}/regular/transmittance/layered/global",
     ),
     Defect(
@@ -201,7 +201,7 @@ KERNELS = (
     ),
     Defect(
         "a flight that escapes where it last was",
-        "path->t = choose(where, path->length, path->t);",
+        "path->t = choose(where, path->ray.length, path->t);",
         "",
         f"{ID}/delta/free_path/homogeneous/grid",
     ),

@@ -1,6 +1,6 @@
 /*---
 title: The cells between the voxel centres of a trilinear grid
-uses: [walk/dda, math/newton]
+uses: [cells/by_dda, math/newton]
 ---*/
 /* Between eight voxel centres the extinction along a ray is a cubic of the distance, so its optical depth
    is a quartic, exactly. The planes lie at i + 1/2. The cubic is one of the share of the cell's span: of the
@@ -12,21 +12,9 @@ typedef struct {
 
 static void cells_begin(Path *path, const Scene *scene)
 {
-    index cell;
-    State *walk = &path->state;
-    dda_axis(path->origin_x + (SCALAR)0.5, path->direction_x, path->length, scene->medium.nx + 1, &cell,
-             &walk->first_x, &walk->delta_x);
-    dda_axis(path->origin_y + (SCALAR)0.5, path->direction_y, path->length, scene->medium.ny + 1, &cell,
-             &walk->first_y, &walk->delta_y);
-    dda_axis(path->origin_z + (SCALAR)0.5, path->direction_z, path->length, scene->medium.nz + 1, &cell,
-             &walk->first_z, &walk->delta_z);
-    dda_begin(path);
-}
-
-static real cell_exit(const Path *path, const Scene *scene)
-{
-    const real plane = dda_plane(path);
-    return smaller(plane, path->length);
+    const Vector at = path->ray.origin;
+    const Vector where = {at.x + (SCALAR)0.5, at.y + (SCALAR)0.5, at.z + (SCALAR)0.5};
+    dda_begin(path, where, path->ray.direction, scene->medium.nx + 1, scene->medium.ny + 1, scene->medium.nz + 1);
 }
 
 /* Along one axis: the voxel below, where in its interval the path enters, and how far it gets there.
@@ -48,9 +36,9 @@ static Cell cell_between(Path *path, const Scene *scene, const real t_enter, con
     count(path->lookups, here);
     const real span = t_exit - t_enter;
     real x, y, z, dx, dy, dz;
-    const index i = cell_axis(path->origin_x, path->direction_x, t_enter, span, scene->medium.nx, &x, &dx);
-    const index j = cell_axis(path->origin_y, path->direction_y, t_enter, span, scene->medium.ny, &y, &dy);
-    const index k = cell_axis(path->origin_z, path->direction_z, t_enter, span, scene->medium.nz, &z, &dz);
+    const index i = cell_axis(path->ray.origin.x, path->ray.direction.x, t_enter, span, scene->medium.nx, &x, &dx);
+    const index j = cell_axis(path->ray.origin.y, path->ray.direction.y, t_enter, span, scene->medium.ny, &y, &dy);
+    const index k = cell_axis(path->ray.origin.z, path->ray.direction.z, t_enter, span, scene->medium.nz, &z, &dz);
     const INTEGER row = (INTEGER)scene->medium.nx, slice = row * (INTEGER)scene->medium.ny;
     const index voxel = k * slice + j * row + i;
     /* Interpolation along x gives lines, along y quadratics, along z the cubic. */
@@ -100,5 +88,3 @@ static real cell_distance(const Cell cell, const real depth, const real length)
     }
     return bracket.at;
 }
-
-static void cell_cross(Path *path, const mask where) { dda_cross(path, path->t, where); }

@@ -4,7 +4,7 @@ uses: [cells/constant]
 ---*/
 static void cells_begin(Path *path, const Scene *scene) {}
 
-static real cell_exit(const Path *path, const Scene *scene) { return path->length; }
+static real cell_exit(const Path *path, const Scene *scene) { return path->ray.length; }
 
 static Cell cell_between(Path *path, const Scene *scene, const real t_enter, const real t_exit, const mask here)
 {

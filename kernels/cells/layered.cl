@@ -1,27 +1,25 @@
 /*---
 title: The layers of a stack
 uses: [cells/constant]
-state:
-  layer: index
-  upwards: index
+state: {layer: index, upwards: index}
 ---*/
 static void cells_begin(Path *path, const Scene *scene)
 {
-    path->state.layer = layer_at(scene, path->origin_z);
-    path->state.upwards = choose(less((real)0, path->direction_z), (index)1, (index)0);
+    path->state.layer = layer_at(scene, path->ray.origin.z);
+    path->state.upwards = choose(less((real)0, path->ray.direction.z), (index)1, (index)0);
 }
 
 static real cell_exit(const Path *path, const Scene *scene)
 {
-    const mask flat = equal(path->direction_z, (real)0);
+    const mask flat = equal(path->ray.direction.z, (real)0);
     const index layers = (index)(INTEGER)scene->medium.layers;
     const index boundary = clamp(path->state.layer + path->state.upwards, (index)0, layers);
     /* The outermost boundaries are where the ray ends, also if rounding puts them a little before that. */
     const mask outermost = less(boundary, (index)1) | less(layers - 1, boundary);
     const real z = gather(scene->medium_data + (int)scene->medium.layers, boundary);
-    const real t = (z - path->origin_z) / choose(flat, (real)1, path->direction_z);
+    const real t = (z - path->ray.origin.z) / choose(flat, (real)1, path->ray.direction.z);
     const real forward = larger(t, path->t);
-    return choose(flat | outermost | less(path->length, forward), path->length, forward);
+    return choose(flat | outermost | less(path->ray.length, forward), path->ray.length, forward);
 }
 
 static Cell cell_between(Path *path, const Scene *scene, const real t_enter, const real t_exit, const mask here)

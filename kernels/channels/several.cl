@@ -1,29 +1,34 @@
 /*---
 title: A path has a weight for each channel
-state:
-  tint: spectrum
-  collected: spectrum
+state: {throughput: spectrum, collected: spectrum}
 ---*/
-/* What a path scores in each channel: its weight, which all channels share, times its tint. */
+/* What a path scores in each channel: its weight, which all channels share, times its throughput. */
 static void channels_begin(Path *path)
 {
     for (int c = 0; c < CHANNELS; ++c) {
-        path->state.tint[c] = (real)1;
+        path->state.throughput[c] = (real)1;
         path->state.collected[c] = (real)0;
     }
 }
 
-static real weight_of(const Path *path, const int channel) { return path->weight * path->state.tint[channel]; }
+static real weight_of(const Path *path, const int channel) { return path->weight * path->state.throughput[channel]; }
+
+/* Lanes `where` have the weight of a channel multiplied. */
+static void scale_throughput(Path *path, const int channel, const real factor, const mask where)
+{
+    real *throughput = &path->state.throughput[channel];
+    *throughput = choose(where, *throughput * factor, *throughput);
+}
+
+static void collect(Path *path, const int channel, const real value, const mask where)
+{
+    real *sum = &path->state.collected[channel];
+    *sum = choose(where, *sum + value, *sum);
+}
 
 static real score_of(const Path *path, const int channel)
 {
     return path->state.collected[channel] + score(weight_of(path, channel), path->t, path->escaped);
-}
-
-/* Lanes `where` have a channel's weight multiplied. */
-static void tint(Path *path, const int channel, const real factor, const mask where)
-{
-    path->state.tint[channel] = choose(where, path->state.tint[channel] * factor, path->state.tint[channel]);
 }
 
 /* The extinction at a tentative collision before it is multiplied by each channel's own,

@@ -6,8 +6,8 @@ uses: [closed_form/by_newton]
    the form that a horizontal ray, x = 0, does not divide by 0. Its inverse is Kepler's equation. */
 static real optical_depth(const Path *path, const Scene *scene, const real t)
 {
-    const real start = scene->medium.wavenumber * path->origin_z + scene->medium.phase;
-    const real half_x = (SCALAR)0.5 * scene->medium.wavenumber * path->direction_z * t;
+    const real start = scene->medium.wavenumber * path->ray.origin.z + scene->medium.phase;
+    const real half_x = (SCALAR)0.5 * scene->medium.wavenumber * path->ray.direction.z * t;
     const mask flat = equal(half_x, (real)0);
     const real sinc = choose(flat, (real)1, sin(half_x) / choose(flat, (real)1, half_x));
     return scene->medium.mean * t * ((SCALAR)1 + scene->medium.amplitude * cos(start + half_x) * sinc);

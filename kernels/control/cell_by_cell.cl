@@ -1,8 +1,7 @@
 /*---
 title: A control and a majorant of the residual for each cell
 uses: [control/collide, walk/cell_by_cell]
-state:
-  control: real
+state: {control: real}
 ---*/
 static void enter_controlled_cell(Path *path, const Scene *scene, const mask entering)
 {
@@ -20,15 +19,15 @@ static mask next_residual(Path *path, const Scene *scene, Rng *rng, mask *contro
     enter_controlled_cell(path, scene, (mask)-1);
     for (;;) {
         const real plane = next_plane(path, scene);
-        const mask inside = less(plane, path->length);
-        const real span = choose(inside, plane, path->length) - path->t;
+        const mask inside = less(plane, path->ray.length);
+        const real span = choose(inside, plane, path->ray.length) - path->t;
         const real residual = to_residual(path, draw, span), control = to_control(path, span);
         const mask found = walking & less(residual, control);
         const mask stopped = walking & ~found & less(control, (real)FAR);
         const mask crossing = walking & inside & ~found & ~stopped;
         const real nearer = smaller(residual, control);
         const real way = smaller(nearer, span);
-        path->depth = choose(walking, path->depth + path->state.control * way, path->depth);
+        path->control_flown = choose(walking, path->control_flown + path->state.control * way, path->control_flown);
         path->t = choose(crossing, plane, choose(walking, path->t + way, path->t));
         escape(path, walking & ~inside & ~found & ~stopped);
         here |= found;

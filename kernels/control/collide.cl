@@ -14,7 +14,7 @@ static real to_residual(const Path *path, const real draw, const real span)
 
 static real to_control(const Path *path, const real span)
 {
-    const real left = path->target - path->depth;
+    const real left = path->target - path->control_flown;
     return choose(less(left, path->state.control * span), left / path->state.control, (real)FAR);
 }
 

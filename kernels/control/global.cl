@@ -1,8 +1,7 @@
 /*---
 title: One control and one majorant of the residual for the whole medium
 uses: [control/collide]
-state:
-  control: real
+state: {control: real}
 ---*/
 static void walk_begin(Path *path, const Scene *scene)
 {
@@ -13,18 +12,18 @@ static void walk_begin(Path *path, const Scene *scene)
 
 /* Every live lane goes on to its next tentative collision with the residual, to its collision with the
    control, or leaves. Returns the lanes at the first; `controlled` are those at the second. The control's
-   optical depth is accumulated in path->depth, and collides where that reaches path->target. */
+   optical depth is accumulated in path->control_flown, and collides where that reaches path->target. */
 static mask next_residual(Path *path, const Scene *scene, Rng *rng, mask *controlled)
 {
     const real draw = exponential(rng);
-    const real rest = path->length - path->t;
+    const real rest = path->ray.length - path->t;
     const real residual = to_residual(path, draw, rest), control = to_control(path, rest);
     const real nearer = smaller(residual, control);
     const real way = smaller(nearer, rest);
     const mask here = path->live & less(residual, control);
     *controlled = path->live & ~here & less(control, (real)FAR);
     path->t = choose(path->live, path->t + way, path->t);
-    path->depth = choose(path->live, path->depth + path->state.control * way, path->depth);
+    path->control_flown = choose(path->live, path->control_flown + path->state.control * way, path->control_flown);
     escape(path, path->live & ~here & ~*controlled);
     return here;
 }

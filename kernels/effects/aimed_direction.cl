@@ -1,7 +1,6 @@
 /*---
 title: Directions that are chosen with a light in mind
-state:
-  aim: real
+state: {aim: real}
 ---*/
 /* Where a path goes on to: with the chance path->state.aim by the angle to the light, of which what a second
    vertex may add is (pi - angle) / sin(angle) to every solid angle; else as the phase function has it. */
@@ -15,17 +14,16 @@ static Vector new_direction(Path *path, const Scene *scene, Rng *rng, const mask
     const real by_phase = sample_cosine(scene, rng);
     const real cosine = choose(aimed, cos(angle), by_phase);
     const real sine = choose(aimed, sin(angle), sine_of(by_phase));
-    const Vector axis = {choose(aimed, light.x, ahead.x), choose(aimed, light.y, ahead.y),
-                         choose(aimed, light.z, ahead.z)};
+    Vector axis = ahead;
+    take_vector(&axis, &light, aimed);
     const Vector turned = around(axis, cosine, sine, rng);
-    const real x = turned.y * light.z - turned.z * light.y;
-    const real y = turned.z * light.x - turned.x * light.z;
-    const real z = turned.x * light.y - turned.y * light.x;
+    const Vector cross = {turned.y * light.z - turned.z * light.y, turned.z * light.x - turned.x * light.z,
+                          turned.x * light.y - turned.y * light.x};
     /* the angle of what was drawn, whichever way: its cosine alone has few digits towards the light */
-    const real across = sqrt(x * x + y * y + z * z), along = turned.x * light.x + turned.y * light.y + turned.z * light.z;
+    const real across = sqrt(dot_of(cross, cross)), along = dot_of(turned, light);
     const real least = (real)ROUNDING, divisor = larger(across, least);
     const real density = ((SCALAR)3.141592653589793 - atan2(across, along)) / divisor * (SCALAR)0.032251534433199495;
-    const real given = phase(scene, turned.x * ahead.x + turned.y * ahead.y + turned.z * ahead.z);
+    const real given = phase(scene, dot_of(turned, ahead));
     const real drawn = ((SCALAR)1 - path->state.aim) * given + path->state.aim * density;
     path->weight = choose(on, path->weight * given / drawn, path->weight);
     return turned;

@@ -4,7 +4,7 @@ static void see_image(Path *path, const Scene *scene, const mask gone)
 {
     if (!any_lane(gone))
         return;
-    const Vector ahead = in_world(scene, path->direction_x, path->direction_y, path->direction_z);
+    const Vector ahead = mapped(scene->space.to_world, path->ray.direction);
     const real off = ahead.x * ahead.x + ahead.y * ahead.y;
     const real x = choose(equal(off, (real)0), (real)1, ahead.x);
     const real u = ((SCALAR)0.5 - (SCALAR)0.5 * atan2pi(ahead.y, x)) * (SCALAR)SKY_COLUMNS;

@@ -1,8 +1,6 @@
 /*---
 title: Distances that are chosen with a light in mind
-state:
-  reach: real
-  density: real
+state: {reach: real, density: real}
 ---*/
 /* Where a ray passes the point light, and the density of distances that the light sees under equal angles. */
 typedef struct {
@@ -15,20 +13,19 @@ typedef struct {
    is right. */
 static Pass pass_light_by(const Path *path, const Scene *scene, const SCALAR near)
 {
-    const Vector to_light = in_world(scene, scene->light.x - path->origin_x, scene->light.y - path->origin_y,
-                                     scene->light.z - path->origin_z);
-    const Vector ahead = heading(path, scene);
+    const Vector at = path->ray.origin;
+    const Vector way = {scene->light.x - at.x, scene->light.y - at.y, scene->light.z - at.z};
+    const Vector to_light = mapped(scene->space.to_world, way), ahead = heading(path, scene);
     Pass pass;
-    pass.nearest = to_light.x * ahead.x + to_light.y * ahead.y + to_light.z * ahead.z;
-    const real x = to_light.x - pass.nearest * ahead.x;
-    const real y = to_light.y - pass.nearest * ahead.y;
-    const real z = to_light.z - pass.nearest * ahead.z;
-    const real off = sqrt(x * x + y * y + z * z);
-    const real least = near * path->length + (SCALAR)1e-20;
+    pass.nearest = dot_of(to_light, ahead);
+    const Vector beside = {to_light.x - pass.nearest * ahead.x, to_light.y - pass.nearest * ahead.y,
+                           to_light.z - pass.nearest * ahead.z};
+    const real off = sqrt(dot_of(beside, beside));
+    const real least = near * path->ray.length + (SCALAR)1e-20;
     pass.off = larger(off, least);
     /* not the difference of two angles: far from the light both are nearly a right one */
-    const real both = pass.off * pass.off - pass.nearest * (path->length - pass.nearest);
-    pass.angle = atan2(path->length * pass.off, both);
+    const real both = pass.off * pass.off - pass.nearest * (path->ray.length - pass.nearest);
+    pass.angle = atan2(path->ray.length * pass.off, both);
     return pass;
 }
 
@@ -58,10 +55,10 @@ static real equiangular_density(const Pass pass, const real t)
 /* As next_tentative, on a ray that ends at `reach`. */
 static mask next_tentative_within(Path *path, const Scene *scene, Rng *rng, const real reach)
 {
-    const real whole = path->length;
-    path->length = reach;
+    const real whole = path->ray.length;
+    path->ray.length = reach;
     const mask here = next_tentative(path, scene, rng);
-    path->length = whole;
+    path->ray.length = whole;
     return here;
 }
 

@@ -1,2 +1,2 @@
 /* The number of scatterings is bounded: every path goes on until then. */
-static mask roulette(Path *path, Rng *rng, const mask on) { return (mask)0; }
+static mask roulette(Path *path, const Scene *scene, Rng *rng, const mask on) { return (mask)0; }

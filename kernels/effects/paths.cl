@@ -17,11 +17,7 @@ static void step(Path *path, const Scene *scene, Rng *rng)
     if (any_lane(ended)) {
         Rng here = *rng;
         at_end(path, scene, &here, ended);
-        const bits_mask narrow = narrow_mask(ended);
-        rng->s0 = choose(narrow, here.s0, rng->s0);
-        rng->s1 = choose(narrow, here.s1, rng->s1);
-        rng->s2 = choose(narrow, here.s2, rng->s2);
-        rng->s3 = choose(narrow, here.s3, rng->s3);
+        take_rng(rng, &here, ended);
     }
     path_end(path, before & (~path->live | ~less(path->steps, (index)MOST_STEPS)));
 }

@@ -1,6 +1,6 @@
 /* Russian roulette: a path goes on with a chance equal to its largest weight, where that is below 1, and its
    weights are divided by it. Returns the lanes that end. */
-static mask roulette(Path *path, Rng *rng, const mask on)
+static mask roulette(Path *path, const Scene *scene, Rng *rng, const mask on)
 {
     real largest = fabs(weight_of(path, 0));
     for (int c = 1; c < CHANNELS; ++c) {

@@ -1,12 +1,11 @@
-/* A flight along a ray, and what happened on it so far. Positions are in medium coordinates; t, length
-   and every coefficient are per unit of world length. */
+/* A flight along a ray, and what happened on it so far. */
 typedef struct {
-    real origin_x, origin_y, origin_z;
-    real direction_x, direction_y, direction_z;
-    real length;              /* of the ray inside the medium */
+    Ray ray;
     real t;                   /* distance flown */
     real depth;               /* optical depth flown, of trackers that accumulate it */
-    real target;              /* the optical depth at which those collide */
+    real majorant_flown;      /* that of the majorant, of walks cell by cell */
+    real control_flown;       /* that of the control */
+    real target;              /* the optical depth, flown or of the control, at which a flight collides */
     real majorant;            /* where the path is now */
     real mean_free_path;      /* 1 / majorant, FAR where the majorant is 0 */
     real weight;
@@ -17,12 +16,41 @@ typedef struct {
     State state;              /* of the walk, the channels and the tracker: fields of their front matter */
 } Path;
 
+/* Lanes `where` fly on as `from` does, on the ray that they have. */
+static void take_flight(Path *into, const Path *from, const mask where)
+{
+    into->t = choose(where, from->t, into->t);
+    into->depth = choose(where, from->depth, into->depth);
+    into->majorant_flown = choose(where, from->majorant_flown, into->majorant_flown);
+    into->control_flown = choose(where, from->control_flown, into->control_flown);
+    into->target = choose(where, from->target, into->target);
+    into->majorant = choose(where, from->majorant, into->majorant);
+    into->mean_free_path = choose(where, from->mean_free_path, into->mean_free_path);
+    into->weight = choose(where, from->weight, into->weight);
+    into->live = choose(where, from->live, into->live);
+    into->escaped = choose(where, from->escaped, into->escaped);
+    into->steps = choose(where, from->steps, into->steps);
+    into->lookups = choose(where, from->lookups, into->lookups);
+    into->crossings = choose(where, from->crossings, into->crossings);
+    take_state(&into->state, &from->state, where);
+}
+
+/* Lanes `where` are at the start of their rays. */
+static void start_flight(Path *path, const mask where)
+{
+    path->t = choose(where, (real)0, path->t);
+    path->depth = choose(where, (real)0, path->depth);
+    path->majorant_flown = choose(where, (real)0, path->majorant_flown);
+    path->control_flown = choose(where, (real)0, path->control_flown);
+    path->target = choose(where, (real)0, path->target);
+}
+
 /* The extinction at distance t: the only place where a lookup happens and is counted. */
 static real sigma_t(Path *path, const Scene *scene, const real t, const mask here)
 {
     count(path->lookups, here);
-    return sigma_t_at(scene, path->origin_x + t * path->direction_x, path->origin_y + t * path->direction_y,
-                      path->origin_z + t * path->direction_z);
+    const Vector place = place_on(&path->ray, t);
+    return sigma_t_at(scene, place.x, place.y, place.z);
 }
 
 /* Lanes `where` have collided: the flight ends at t, inside the medium. */
@@ -31,7 +59,7 @@ static void collide(Path *path, const mask where) { path->live &= ~where; }
 /* Lanes `where` leave the medium. */
 static void escape(Path *path, const mask where)
 {
-    path->t = choose(where, path->length, path->t);
+    path->t = choose(where, path->ray.length, path->t);
     path->escaped |= where;
     path->live &= ~where;
 }

@@ -5,6 +5,15 @@ typedef struct {
     bits s0, s1, s2, s3;
 } Rng;
 
+static void take_rng(Rng *into, const Rng *from, const mask where)
+{
+    const bits_mask narrow = narrow_mask(where);
+    into->s0 = choose(narrow, from->s0, into->s0);
+    into->s1 = choose(narrow, from->s1, into->s1);
+    into->s2 = choose(narrow, from->s2, into->s2);
+    into->s3 = choose(narrow, from->s3, into->s3);
+}
+
 static bits rotate_left(const bits x, const uint k) { return (x << k) | (x >> (32 - k)); }
 
 static bits next_bits(Rng *rng)

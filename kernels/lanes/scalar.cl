@@ -20,6 +20,8 @@ typedef int bits_mask;
 #define as_real(x) as_float(x)
 #define as_index(x) as_int(x)
 #define as_bits(x) as_uint(x)
-#define gather(pointer, i) ((real)(pointer)[i])
+#define load_lane(p, i) (p)[i]
+#define gather_by(load, p, i) ((real)load(p, i))
+#define gather(p, i) gather_by(load_lane, p, i)
 #define store_lanes(x, array) ((array)[0] = (x))
 #define load_lanes(array) ((array)[0])

@@ -27,41 +27,19 @@ typedef JOIN(int, LANES) bits_mask;
 typedef JOIN(INTEGER, 2) mask2;
 typedef JOIN(INTEGER, 4) mask4;
 typedef JOIN(INTEGER, 8) mask8;
-
-#if LANES == 2
-static int any_lane(const mask m) { return (m.x | m.y) != 0; }
-static int lane_count(const mask m) { return -(int)(m.x + m.y); }
-#define gather(p, i) ((real)((p)[(i).s0], (p)[(i).s1]))
-#elif LANES == 4
-static int any_lane(const mask m)
-{
-    const mask2 half2 = m.lo | m.hi;
-    return (half2.x | half2.y) != 0;
-}
-static int lane_count(const mask m)
-{
-    const mask2 sum2 = m.lo + m.hi;
-    return -(int)(sum2.x + sum2.y);
-}
-#define gather(p, i) ((real)((p)[(i).s0], (p)[(i).s1], (p)[(i).s2], (p)[(i).s3]))
-#elif LANES == 8
-static int any_lane(const mask m)
-{
-    const mask4 half4 = m.lo | m.hi;
-    const mask2 half2 = half4.lo | half4.hi;
-    return (half2.x | half2.y) != 0;
-}
-static int lane_count(const mask m)
-{
-    const mask4 sum4 = m.lo + m.hi;
-    const mask2 sum2 = sum4.lo + sum4.hi;
-    return -(int)(sum2.x + sum2.y);
-}
-#define gather(p, i)                                                                               \
-    ((real)((p)[(i).s0], (p)[(i).s1], (p)[(i).s2], (p)[(i).s3], (p)[(i).s4], (p)[(i).s5],          \
-            (p)[(i).s6], (p)[(i).s7]))
-#elif LANES == 16
-#ifdef BY_ELEMENT
+typedef JOIN(INTEGER, 16) mask16;
+static int any_lane2(const mask2 m) { return (m.x | m.y) != 0; }
+static int any_lane4(const mask4 m) { return any_lane2(m.lo | m.hi); }
+static int any_lane8(const mask8 m) { return any_lane4(m.lo | m.hi); }
+static int any_lane16(const mask16 m) { return any_lane8(m.lo | m.hi); }
+static int lane_count2(const mask2 m) { return -(int)(m.x + m.y); }
+static int lane_count4(const mask4 m) { return lane_count2(m.lo + m.hi); }
+static int lane_count8(const mask8 m) { return lane_count4(m.lo + m.hi); }
+static int lane_count16(const mask16 m) { return lane_count8(m.lo + m.hi); }
+#ifndef BY_ELEMENT
+#define any_lane(m) JOIN(any_lane, LANES)(m)
+#define lane_count(m) JOIN(lane_count, LANES)(m)
+#else
 /* Oclgrind 21.10 takes element 3 of the sum of two halves of 16 for uninitialised. */
 static int lane_count(const mask m)
 {
@@ -72,25 +50,17 @@ static int lane_count(const mask m)
         count -= (int)one[lane];
     return count;
 }
-static int any_lane(const mask m) { return lane_count(m) != 0; }
-#else
-static int any_lane(const mask m)
-{
-    const mask8 half8 = m.lo | m.hi;
-    const mask4 half4 = half8.lo | half8.hi;
-    const mask2 half2 = half4.lo | half4.hi;
-    return (half2.x | half2.y) != 0;
-}
-static int lane_count(const mask m)
-{
-    const mask8 sum8 = m.lo + m.hi;
-    const mask4 sum4 = sum8.lo + sum8.hi;
-    const mask2 sum2 = sum4.lo + sum4.hi;
-    return -(int)(sum2.x + sum2.y);
-}
+#define any_lane(m) (lane_count(m) != 0)
 #endif
-#define gather(p, i)                                                                               \
-    ((real)((p)[(i).s0], (p)[(i).s1], (p)[(i).s2], (p)[(i).s3], (p)[(i).s4], (p)[(i).s5],          \
-            (p)[(i).s6], (p)[(i).s7], (p)[(i).s8], (p)[(i).s9], (p)[(i).sa], (p)[(i).sb],          \
-            (p)[(i).sc], (p)[(i).sd], (p)[(i).se], (p)[(i).sf]))
-#endif
+
+/* One load a lane, each by `load(p, i)`. */
+#define load_each2(load, p, i) load(p, (i).s0), load(p, (i).s1)
+#define load_each4(load, p, i) load_each2(load, p, i), load(p, (i).s2), load(p, (i).s3)
+#define load_each8(load, p, i)                                                                     \
+    load_each4(load, p, i), load(p, (i).s4), load(p, (i).s5), load(p, (i).s6), load(p, (i).s7)
+#define load_each16(load, p, i)                                                                    \
+    load_each8(load, p, i), load(p, (i).s8), load(p, (i).s9), load(p, (i).sa), load(p, (i).sb),    \
+        load(p, (i).sc), load(p, (i).sd), load(p, (i).se), load(p, (i).sf)
+#define load_lane(p, i) (p)[i]
+#define gather_by(load, p, i) ((real)(JOIN(load_each, LANES)(load, p, i)))
+#define gather(p, i) gather_by(load_lane, p, i)

@@ -11,8 +11,8 @@ static mask fly_through(Path *path, const Scene *scene, const real whole_draw)
     mask here = (mask)0;
     for (;;) {
         const real plane = next_plane(path, scene);
-        const mask inside = less(plane, path->length);
-        const real depth = path->majorant * (choose(inside, plane, path->length) - path->t);
+        const mask inside = less(plane, path->ray.length);
+        const real depth = path->majorant * (choose(inside, plane, path->ray.length) - path->t);
         const mask found = walking & less(draw, depth);
         const mask crossing = walking & inside & ~found;
         escape(path, walking & ~inside & ~found);
@@ -26,12 +26,11 @@ static mask fly_through(Path *path, const Scene *scene, const real whole_draw)
         draw = choose(crossing, larger(left, (real)0), draw);
         enter_next_cell(path, scene, plane, crossing);
     }
-    path->depth = choose(here, path->depth + whole_draw, path->depth);
+    path->majorant_flown = choose(here, path->majorant_flown + whole_draw, path->majorant_flown);
     return here;
 }
 
-/* Every live lane goes on to its next tentative collision or leaves; returns those now at one. path->depth
-   is the majorant's optical depth flown. */
+/* Every live lane goes on to its next tentative collision or leaves; returns those now at one. */
 static mask next_tentative(Path *path, const Scene *scene, Rng *rng)
 {
     return fly_through(path, scene, exponential(rng));
@@ -55,10 +54,10 @@ static real walk_ahead(Path *probe, const Scene *scene, mask walking, const real
     real depth = (real)0;
     while (any_lane(walking)) {
         const real plane = next_plane(probe, scene);
-        const real t_exit = smaller(plane, probe->length);
+        const real t_exit = smaller(plane, probe->ray.length);
         depth = choose(walking, depth + probe->majorant * (t_exit - probe->t), depth);
         probe->t = choose(walking, t_exit, probe->t);
-        walking &= less(plane, probe->length) & less(depth, enough);
+        walking &= less(plane, probe->ray.length) & less(depth, enough);
         enter_next_cell(probe, scene, plane, walking);
     }
     return depth;
@@ -79,7 +78,7 @@ static real majorant_depth(Path *path, const Scene *scene)
 #define BLACK 128
 static real majorant_depth_ahead(Path *path, const Scene *scene, const real whole, const mask where)
 {
-    const real ahead = whole - path->depth;
+    const real ahead = whole - path->majorant_flown;
     const mask walked = where & less((real)MANY_ROUNDINGS, whole) & less(ahead, (real)MANY_ROUNDINGS);
     if (!any_lane(walked))
         return ahead;

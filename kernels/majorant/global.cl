@@ -8,15 +8,13 @@ static void walk_begin(Path *path, const Scene *scene)
     path->mean_free_path = choose(less((real)0, path->majorant), (SCALAR)1 / path->majorant, (real)FAR);
 }
 
-/* Every live lane goes on to its next tentative collision or leaves; returns those now at one. path->depth
-   is the majorant's optical depth flown. A majorant of 0 leaves no optical depth that a draw could stay below,
-   not even a draw of 0. */
+/* Every live lane goes on to its next tentative collision or leaves; returns those now at one. A majorant of 0
+   leaves no optical depth that a draw could stay below, not even a draw of 0. */
 static mask next_tentative(Path *path, const Scene *scene, Rng *rng)
 {
     const real draw = exponential(rng);
-    const mask here = path->live & less(draw, path->majorant * (path->length - path->t));
+    const mask here = path->live & less(draw, path->majorant * (path->ray.length - path->t));
     path->t = choose(here, path->t + draw * path->mean_free_path, path->t);
-    path->depth = choose(here, path->depth + draw, path->depth);
     escape(path, path->live & ~here);
     return here;
 }
@@ -25,14 +23,14 @@ static mask next_tentative(Path *path, const Scene *scene, Rng *rng)
 static void place_at_depth(Path *path, const Scene *scene, const real depth)
 {
     const real t = depth * path->mean_free_path;
-    path->t = choose(path->live, smaller(t, path->length), path->t);
+    path->t = choose(path->live, smaller(t, path->ray.length), path->t);
 }
 
 /* The majorant's optical depth of the whole ray. */
-static real majorant_depth(Path *path, const Scene *scene) { return path->majorant * path->length; }
+static real majorant_depth(Path *path, const Scene *scene) { return path->majorant * path->ray.length; }
 
 /* That from here on, which is what the next draw is held against. */
 static real majorant_depth_ahead(const Path *path, const Scene *scene, const real whole, const mask where)
 {
-    return path->majorant * (path->length - path->t);
+    return path->majorant * (path->ray.length - path->t);
 }

@@ -2,10 +2,6 @@
 title: Analytic inversion of the CDF
 estimands: [transmittance, free_path, radiance, path_length]
 needs: [closed_form]
-channels: 1
-bounding: false
-unbiased: true
-parameters: {}
 citation: Novak, Georgiev, Hanika, Jarosz 2018, Monte Carlo methods for volumetric light transport simulation
 ---*/
 /* Solves tau(t) = -log(1 - u) in closed form. As an estimate of transmittance it is exp(-tau), exactly. */
@@ -13,7 +9,7 @@ static void begin(Path *path, const Scene *scene, Rng *rng) { path->target = sam
 
 static void step(Path *path, const Scene *scene, Rng *rng)
 {
-    path->depth = optical_depth(path, scene, path->length);
+    path->depth = optical_depth(path, scene, path->ray.length);
     const mask here = path->live & less(path->target, path->depth);
     if (any_lane(here))
         path->t = choose(here, distance_to(path, scene, path->target), path->t);

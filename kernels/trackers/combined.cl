@@ -5,9 +5,7 @@ needs: [majorant, light]
 bounding: true
 parameters:
   share: {default: 0.5, above: 0, below: 1, meaning: chance of an equiangular distance}
-state:
-  angular: mask
-  rate: real
+state: {angular: mask, rate: real}
 citation: >-
   Veach, Guibas 1995, Optimally combining sampling techniques for Monte Carlo rendering; Kulla, Fajardo 2012,
   Importance sampling techniques for path tracing in participating media
@@ -15,7 +13,7 @@ citation: >-
 /* One of the two is drawn, and weighted by the balance heuristic. The density of delta tracking is known only up
    to the transmittance, so the heuristic takes that of a homogeneous medium of a mean extinction: any weights
    that sum to 1 at every distance are right. Both lanes share a step's lookup. */
-static real weight_of_angular(const Path *path, const Scene *scene, const real t, const real density)
+static real mis_weight(const Path *path, const Scene *scene, const real t, const real density)
 {
     const real angular = scene->tracker.share * density;
     const real other = ((SCALAR)1 - scene->tracker.share) * path->state.rate * exp(-path->state.rate * t);
@@ -28,11 +26,11 @@ static void begin(Path *path, const Scene *scene, Rng *rng)
     const Pass pass = pass_light(path, scene);
     real sum = (real)0;
     for (int i = 0; i < 4; ++i)
-        sum += sigma_t(path, scene, ((SCALAR)i + (SCALAR)0.5) / 4 * path->length, (mask)-1);
+        sum += sigma_t(path, scene, ((SCALAR)i + (SCALAR)0.5) / 4 * path->ray.length, (mask)-1);
     path->state.rate = sum / (SCALAR)4;
     path->state.angular = less(uniform(rng), (real)scene->tracker.share);
-    const real reach = equiangular_distance(pass, uniform(rng), path->length);
-    path->state.reach = choose(path->state.angular, reach, path->length);
+    const real reach = equiangular_distance(pass, uniform(rng), path->ray.length);
+    path->state.reach = choose(path->state.angular, reach, path->ray.length);
     path->state.density = equiangular_density(pass, reach);
     walk_begin(path, scene);
 }
@@ -52,7 +50,7 @@ static void step(Path *path, const Scene *scene, Rng *rng)
     const Pass pass = pass_light(path, scene);
     const real end_sigma = sigma_t(path, scene, path->t, arrived);
     const real density = equiangular_density(pass, path->t);
-    const real share = weight_of_angular(path, scene, path->t, density);
+    const real share = mis_weight(path, scene, path->t, density);
     const real by_angle = share * end_sigma / (scene->tracker.share * path->state.density);
     const real escaped = choose(path->escaped, (real)1, (SCALAR)1 - share);
     const real factor = choose(arrived, by_angle, escaped / ((SCALAR)1 - scene->tracker.share));

@@ -2,22 +2,14 @@
 title: Delta tracking
 estimands: [transmittance, free_path, radiance, path_length]
 needs: [majorant]
-shares_lookup: true
-channels: 1
 bounding: true
-unbiased: true
-parameters: {}
 citation: >-
   Woodcock, Murphy, Hemmings, Longworth 1965, Techniques used in the GEM code for Monte Carlo neutronics
   calculations; Raab, Seibert, Keller 2008, Unbiased global illumination with participating media
 ---*/
 /* A tentative collision is real with probability sigma_t / majorant; a path that has none escapes with
    weight 1, which estimates transmittance by a binary variable. */
-static void begin(Path *path, const Scene *scene, Rng *rng) { walk_begin(path, scene); }
-
-static void step(Path *path, const Scene *scene, Rng *rng)
+static void at_tentative(Path *path, const Scene *scene, Rng *rng, const mask here, const real sigma_t)
 {
-    const mask here = next_tentative(path, scene, rng);
-    const real sigma = sigma_t_at_tentative(path, scene, here);
-    collide(path, here & less(uniform(rng) * path->majorant, sigma));
+    collide(path, here & less(uniform(rng) * path->majorant, sigma_t));
 }

@@ -10,7 +10,7 @@ citation: Kulla, Fajardo 2012, Importance sampling techniques for path tracing i
 static void begin(Path *path, const Scene *scene, Rng *rng)
 {
     const Pass pass = pass_light(path, scene);
-    path->state.reach = equiangular_distance(pass, uniform(rng), path->length);
+    path->state.reach = equiangular_distance(pass, uniform(rng), path->ray.length);
     path->state.density = equiangular_density(pass, path->state.reach);
     walk_begin(path, scene);
 }

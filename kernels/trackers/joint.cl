@@ -30,14 +30,14 @@ static void begin(Path *path, const Scene *scene, Rng *rng)
     Receding receding;
     real of_first = (real)0, place = u, relative = (real)1;
     if (any_lane(another)) {
-        receding = receding_from(pass.off, pass.nearest, path->length);
-        of_first = inverse_distance(receding, u, path->length);
+        receding = receding_from(pass.off, pass.nearest, path->ray.length);
+        of_first = inverse_distance(receding, u, path->ray.length);
         place = choose(first, place_under_angle(pass, of_first), u);
     }
 #ifndef ISOTROPIC
     relative = tabulated_angle(scene, pass, u, first, &place);
 #endif
-    const real reach = choose(first, of_first, equiangular_distance(pass, place, path->length));
+    const real reach = choose(first, of_first, equiangular_distance(pass, place, path->ray.length));
     path->state.density = equiangular_density(pass, reach) * relative;
     if (any_lane(another)) {
         const real by_distance = inverse_distance_density(receding, pass.off, reach - pass.nearest);

@@ -2,9 +2,6 @@
 title: The bare lookup
 estimands: [mean_extinction]
 needs: []
-channels: 1
-bounding: false
-unbiased: true
 parameters:
   lookups: {default: 64, minimum: 1, maximum: 100000, meaning: lookups a sample}
 citation: no paper; a yardstick of what the medium alone costs

@@ -2,8 +2,6 @@
 title: Ray marching
 estimands: [transmittance, free_path]
 needs: []
-channels: 1
-bounding: false
 unbiased: false
 parameters:
   step: {unit: length, default: 0.01, above: 0, meaning: length of a step}
@@ -21,7 +19,7 @@ static void begin(Path *path, const Scene *scene, Rng *rng) { path->target = sam
 static void step(Path *path, const Scene *scene, Rng *rng)
 {
     const real full = to_real(path->steps) * scene->tracker.step;
-    const real t_exit = smaller(full, path->length);
+    const real t_exit = smaller(full, path->ray.length);
     const real length = t_exit - path->t;
 #if PLACEMENT == PLACEMENT_JITTERED
     const real sample = path->t + uniform(rng) * length;
@@ -37,5 +35,5 @@ static void step(Path *path, const Scene *scene, Rng *rng)
     collide(path, here);
     path->depth = choose(path->live, depth, path->depth);
     path->t = choose(path->live, t_exit, path->t);
-    escape_through_depth(path, path->live & ~less(t_exit, path->length));
+    escape_through_depth(path, path->live & ~less(t_exit, path->ray.length));
 }

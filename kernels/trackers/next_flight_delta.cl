@@ -2,10 +2,8 @@
 title: Next-flight delta tracking
 estimands: [transmittance]
 needs: [majorant]
-shares_lookup: true
 bounding: true
-state:
-  total: real
+state: {total: real}
 citation: >-
   Cramer 1978, Application of the fictitious scattering model for deep-penetration Monte Carlo
   calculations; Novak, Georgiev, Hanika, Jarosz 2018, section 4.2
@@ -17,15 +15,13 @@ static void begin(Path *path, const Scene *scene, Rng *rng)
     walk_begin(path, scene);
     path->weight = (real)0;
     path->state.total = majorant_depth(path, scene);
-    deposit(path, exp(-path->state.total), path->length, (mask)-1, (mask)-1);
+    splat(path, exp(-path->state.total), path->ray.length, (mask)-1, (mask)-1);
 }
 
-static void step(Path *path, const Scene *scene, Rng *rng)
+static void at_tentative(Path *path, const Scene *scene, Rng *rng, const mask here, const real sigma_t)
 {
-    const mask here = next_tentative(path, scene, rng);
-    const real sigma = sigma_t_at_tentative(path, scene, here);
-    collide(path, here & less(uniform(rng) * path->majorant, sigma));
+    collide(path, here & less(uniform(rng) * path->majorant, sigma_t));
     const mask null = here & path->live;
     const real ahead = majorant_depth_ahead(path, scene, path->state.total, null);
-    deposit(path, exp(-ahead), path->length, (mask)-1, null);
+    splat(path, exp(-ahead), path->ray.length, (mask)-1, null);
 }

@@ -2,10 +2,7 @@
 title: Next-flight ratio tracking
 estimands: [transmittance]
 needs: [majorant]
-shares_lookup: true
-state:
-  throughput: real
-  total: real
+state: {survival: real, total: real}
 citation: >-
   Cramer 1978, Application of the fictitious scattering model for deep-penetration Monte Carlo
   calculations; Novak, Georgiev, Hanika, Jarosz 2018, section 4.2
@@ -16,18 +13,16 @@ static void begin(Path *path, const Scene *scene, Rng *rng)
 {
     walk_begin(path, scene);
     path->weight = (real)0;
-    path->state.throughput = (real)1;
+    path->state.survival = (real)1;
     path->state.total = majorant_depth(path, scene);
-    deposit(path, exp(-path->state.total), path->length, (mask)-1, (mask)-1);
+    splat(path, exp(-path->state.total), path->ray.length, (mask)-1, (mask)-1);
 }
 
-static void step(Path *path, const Scene *scene, Rng *rng)
+static void at_tentative(Path *path, const Scene *scene, Rng *rng, const mask here, const real sigma_t)
 {
-    const mask here = next_tentative(path, scene, rng);
-    const real sigma_n = path->majorant - sigma_t_at_tentative(path, scene, here);
-    const real null = sigma_n / path->majorant;
-    const real throughput = path->state.throughput * null;
-    path->state.throughput = choose(here, throughput, path->state.throughput);
+    const real sigma_n = path->majorant - sigma_t;
+    const real survival = path->state.survival * (sigma_n / path->majorant);
+    path->state.survival = choose(here, survival, path->state.survival);
     const real ahead = majorant_depth_ahead(path, scene, path->state.total, here);
-    deposit(path, throughput * exp(-ahead), path->length, (mask)-1, here);
+    splat(path, survival * exp(-ahead), path->ray.length, (mask)-1, here);
 }

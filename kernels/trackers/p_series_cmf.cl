@@ -8,10 +8,7 @@ parameters:
     minimum: 0
     below: 1
     meaning: share of the Poisson mass whose terms are all evaluated, before Russian roulette
-state:
-  term: real
-  log_mass: real
-  summed: real
+state: {total: real, term: real, log_mass: real, summed: real}
 citation: >-
   Georgiev, Misso, Hachisuka, Nowrouzezahrai, Krivanek, Jarosz 2019, Integral formulations of volumetric
   transmittance, section 5
@@ -22,22 +19,22 @@ citation: >-
 static void begin(Path *path, const Scene *scene, Rng *rng)
 {
     walk_begin(path, scene);
-    path->depth = majorant_depth(path, scene);
-    path->state.log_mass = -path->depth;
+    path->state.total = majorant_depth(path, scene);
+    path->state.log_mass = -path->state.total;
     path->state.term = (real)1;
-    path->state.summed = exp(-path->depth);
+    path->state.summed = exp(-path->state.total);
     path->weight = (real)0;
-    deposit(path, exp(-path->depth), path->length, (mask)-1, (mask)-1);
+    splat(path, exp(-path->state.total), path->ray.length, (mask)-1, (mask)-1);
 }
 
 static void step(Path *path, const Scene *scene, Rng *rng)
 {
     State *state = &path->state;
     const real order = to_real(path->steps);
-    const real ratio = path->depth / order;
+    const real ratio = state->total / order;
     const mask roulette = ~less(state->summed, (real)scene->tracker.mass);
     const mask stopped = path->live & ((roulette & ~less(uniform(rng), ratio)) | equal(ratio, (real)0));
-    place_at_depth(path, scene, uniform(rng) * path->depth);
+    place_at_depth(path, scene, uniform(rng) * state->total);
     escape(path, stopped);
     const mask here = path->live;
     const real sigma = sigma_t_at_tentative(path, scene, here);
@@ -49,5 +46,5 @@ static void step(Path *path, const Scene *scene, Rng *rng)
     state->log_mass = choose(grows, state->log_mass + log(ratio), state->log_mass);
     const real mass = exp(state->log_mass);
     state->summed = choose(here, state->summed + mass, state->summed);
-    deposit(path, mass * state->term, path->length, (mask)-1, here);
+    splat(path, mass * state->term, path->ray.length, (mask)-1, here);
 }

@@ -2,11 +2,9 @@
 title: Regular tracking
 estimands: [transmittance, free_path, radiance, path_length]
 needs: [cells]
-channels: 1
-bounding: false
-unbiased: true
-parameters: {}
-citation: Amanatides, Woo 1987, A fast voxel traversal algorithm; Sutton, Brown, Bjorkman et al. 1999 (of the cells' exact integral)
+citation: >-
+  Amanatides, Woo 1987, A fast voxel traversal algorithm; Sutton, Brown, Bjorkman et al. 1999 (of the cells' exact
+  integral)
 ---*/
 /* One cell of the medium a step: its optical depth is exact, and so is the distance at which the sampled
    depth is reached within it. As an estimate of transmittance it is exp(-tau), exactly. */
@@ -27,7 +25,7 @@ static void step(Path *path, const Scene *scene, Rng *rng)
     collide(path, here);
     path->depth = choose(path->live, depth, path->depth);
     path->t = choose(path->live, t_exit, path->t);
-    const mask leaving = path->live & ~less(t_exit, path->length);
+    const mask leaving = path->live & ~less(t_exit, path->ray.length);
     escape_through_depth(path, leaving);
     cell_cross(path, path->live);
 }

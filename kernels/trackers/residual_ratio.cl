@@ -32,5 +32,5 @@ static void step(Path *path, const Scene *scene, Rng *rng)
     path->weight = choose(here, path->weight * null, path->weight);
     const mask left = before & ~path->live;
     if (any_lane(left))
-        path->weight = choose(left, path->weight * exp(-path->depth), path->weight);
+        path->weight = choose(left, path->weight * exp(-path->control_flown), path->weight);
 }

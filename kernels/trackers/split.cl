@@ -2,7 +2,6 @@
 title: Splitting into the real and the null branch
 estimands: [transmittance, free_path]
 needs: [majorant]
-shares_lookup: true
 citation: >-
   Eymet, Poitou, Galtier, El Hafi, Terree, Fournier 2013, Null-collision meshless Monte Carlo;
   Szirmay-Kalos, Georgiev, Magdics, Molnar, Legrady 2017, Unbiased light transport estimators for
@@ -10,14 +9,10 @@ citation: >-
 ---*/
 /* Both branches are followed, with the weights sigma_t / majorant and sigma_n / majorant. The real branch ends
    where it begins, so it is scored at once and no stack is needed; the null branch flies on. */
-static void begin(Path *path, const Scene *scene, Rng *rng) { walk_begin(path, scene); }
-
-static void step(Path *path, const Scene *scene, Rng *rng)
+static void at_tentative(Path *path, const Scene *scene, Rng *rng, const mask here, const real sigma_t)
 {
-    const mask here = next_tentative(path, scene, rng);
-    const real sigma = sigma_t_at_tentative(path, scene, here);
-    const real real_share = sigma / path->majorant;
-    const real null_share = (path->majorant - sigma) / path->majorant;
-    deposit(path, path->weight * real_share, path->t, (mask)0, here);
+    const real real_share = sigma_t / path->majorant;
+    const real null_share = (path->majorant - sigma_t) / path->majorant;
+    splat(path, path->weight * real_share, path->t, (mask)0, here);
     path->weight = choose(here, path->weight * null_share, path->weight);
 }

@@ -35,7 +35,7 @@ static void begin(Path *path, const Scene *scene, Rng *rng)
 {
     const int bins = (int)scene->tracker.bins;
     const Pass pass = pass_light(path, scene);
-    const real width = path->length / scene->tracker.bins;
+    const real width = path->ray.length / scene->tracker.bins;
     real sum = (real)0, depth = (real)0;
     for (int bin = 0; bin < bins; ++bin)
         sum += bin_value(path, scene, pass, bin, width, &depth, (mask)-1);
@@ -54,7 +54,7 @@ static void begin(Path *path, const Scene *scene, Rng *rng)
         looking &= ~here;
     }
     const real reach = found * width;
-    path->state.reach = clamp(reach, (real)0, path->length);
+    path->state.reach = clamp(reach, (real)0, path->ray.length);
     path->state.density = share / width;
     walk_begin(path, scene);
 }

@@ -42,7 +42,7 @@ static void step(Path *path, const Scene *scene, Rng *rng)
 {
     State *state = &path->state;
     const real intervals = choose(state->coarsest, (real)scene->tracker.steps, state->finest);
-    const real length = path->length / intervals;
+    const real length = path->ray.length / intervals;
     const real sigma = sigma_t(path, scene, (state->step + uniform(rng)) * length, path->live);
     const mask coin = less(uniform(rng), (real)(SCALAR)0.5);
     state->aside = ~state->coarsest & choose(state->second, ~state->aside, coin);
@@ -55,7 +55,7 @@ static void step(Path *path, const Scene *scene, Rng *rng)
         const real fine = exp(-path->depth - state->depth_aside);
         const real one = exp(-2 * path->depth), other = exp(-2 * state->depth_aside);
         const real correction = (fine - (SCALAR)0.5 * (one + other)) / state->chance;
-        deposit(path, choose(state->coarsest, fine, correction), path->length, (mask)-1, ended);
+        splat(path, choose(state->coarsest, fine, correction), path->ray.length, (mask)-1, ended);
         escape(path, ended & ~state->coarsest);
         path->depth = choose(ended, (real)0, path->depth);
         state->step = choose(ended, (real)0, state->step);

@@ -3,8 +3,7 @@ title: Track-length estimator of transmittance
 estimands: [transmittance]
 needs: [majorant]
 bounding: true
-state:
-  absorbed: real
+state: {absorbed: real}
 citation: >-
   Spanier 1966, Two pairs of families of estimators for transport problems; Novak, Georgiev, Hanika,
   Jarosz 2018, section 4.2; the derivation is in docs/estimators.md

@@ -2,7 +2,6 @@
 title: Null-collision tracking with free sampling rate and acceptance
 estimands: [transmittance, free_path, radiance, path_length]
 needs: [majorant]
-shares_lookup: true
 parameters:
   acceptance:
     default: 1
@@ -17,16 +16,12 @@ citation: >-
 /* The form behind its relatives. The sampling rate is the majorant times tightness; a tentative collision is
    real with probability a sigma_t / (a sigma_t + |sigma_n|). a = 1 is delta tracking where the majorant
    bounds, a = 0 ratio tracking, and what lies between is ratio tracking with ever more Russian roulette. */
-static void begin(Path *path, const Scene *scene, Rng *rng) { walk_begin(path, scene); }
-
-static void step(Path *path, const Scene *scene, Rng *rng)
+static void at_tentative(Path *path, const Scene *scene, Rng *rng, const mask here, const real sigma_t)
 {
-    const mask here = next_tentative(path, scene, rng);
-    const real sigma = sigma_t_at_tentative(path, scene, here);
-    const real sigma_n = path->majorant - sigma;
+    const real sigma_n = path->majorant - sigma_t;
     const SCALAR acceptance = scene->tracker.acceptance;
-    const real both = acceptance * sigma + fabs(sigma_n);
-    const mask collided = here & less(uniform(rng) * both, acceptance * sigma);
+    const real both = acceptance * sigma_t + fabs(sigma_n);
+    const mask collided = here & less(uniform(rng) * both, acceptance * sigma_t);
     const real sign = choose(less(sigma_n, (real)0), (real)-1, (real)1);
     const real share = choose(collided, both / (acceptance > 0 ? acceptance : (SCALAR)1), sign * both);
     const real relative = share / path->majorant;

@@ -58,7 +58,7 @@ static void step(Path *path, const Scene *scene, Rng *rng)
     State *state = &path->state;
     const real u = uniform(rng);
     state->offset = choose(path->live & equal(state->tooth, (real)0), u, state->offset);
-    const real length = path->length / state->teeth;
+    const real length = path->ray.length / state->teeth;
     const real sigma = sigma_t(path, scene, (state->tooth + state->offset) * length, path->live);
     path->depth = choose(path->live, path->depth + sigma * length, path->depth);
     state->tooth = choose(path->live, state->tooth + 1, state->tooth);

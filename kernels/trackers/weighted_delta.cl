@@ -2,7 +2,6 @@
 title: Weighted delta tracking
 estimands: [transmittance, free_path, radiance, path_length]
 needs: [majorant]
-shares_lookup: true
 bounding: {probability: [analog]}
 single_flight: {probability: [no_absorption]}
 parameters:
@@ -23,21 +22,17 @@ citation: >-
 ---*/
 /* The probabilities are free, and the weight makes good for them: (sigma / majorant) / P for the event that
    was chosen. Where the majorant does not bound, sigma_n is negative and so is the weight of null collisions. */
-static void begin(Path *path, const Scene *scene, Rng *rng) { walk_begin(path, scene); }
-
-static void step(Path *path, const Scene *scene, Rng *rng)
+static void at_tentative(Path *path, const Scene *scene, Rng *rng, const mask here, const real sigma_t)
 {
-    const mask here = next_tentative(path, scene, rng);
-    const real sigma = sigma_t_at_tentative(path, scene, here);
 #if PROBABILITY == PROBABILITY_ANALOG
-    const mask collided = here & less(uniform(rng) * path->majorant, sigma);
+    const mask collided = here & less(uniform(rng) * path->majorant, sigma_t);
 #else
-    const real sigma_n = path->majorant - sigma;
+    const real sigma_n = path->majorant - sigma_t;
 #if PROBABILITY == PROBABILITY_NO_ABSORPTION
-    const real ends = scene->tracker.albedo * sigma;
-    deposit(path, path->weight * (sigma - ends) / path->majorant, path->t, (mask)0, here);
+    const real ends = scene->tracker.albedo * sigma_t;
+    splat(path, path->weight * (sigma_t - ends) / path->majorant, path->t, (mask)0, here);
 #else
-    const real ends = sigma;
+    const real ends = sigma_t;
 #endif
     const real both = ends + fabs(sigma_n);
     const mask collided = here & less(uniform(rng) * both, ends);

@@ -1,11 +1,7 @@
 /*---
 title: The walk through a regular grid of majorants, by DDA
-uses: [walk/dda]
-state:
-  cell: index
-  stride_x: index
-  stride_y: index
-  stride_z: index
+uses: [walk/dda, walk/in_cells]
+state: {cell: index, stride: Indices}
 ---*/
 /* majorant_data has one more layer of cells on every side, a copy of its neighbour: a plane that rounding
    puts just inside the end of the ray leads there and not into another row. */
@@ -24,18 +20,12 @@ static void cells_enter(Path *path, const Scene *scene)
     State *walk = &path->state;
     const INTEGER row = (INTEGER)scene->majorant.nx + 2;
     const INTEGER slice = row * ((INTEGER)scene->majorant.ny + 2);
-    index i, j, k;
-    dda_axis(path->origin_x * scene->majorant.cells_per_x, path->direction_x * scene->majorant.cells_per_x,
-             path->length, scene->majorant.nx, &i, &walk->first_x, &walk->delta_x);
-    dda_axis(path->origin_y * scene->majorant.cells_per_y, path->direction_y * scene->majorant.cells_per_y,
-             path->length, scene->majorant.ny, &j, &walk->first_y, &walk->delta_y);
-    dda_axis(path->origin_z * scene->majorant.cells_per_z, path->direction_z * scene->majorant.cells_per_z,
-             path->length, scene->majorant.nz, &k, &walk->first_z, &walk->delta_z);
-    walk->cell = (k + 1) * slice + (j + 1) * row + (i + 1);
-    walk->stride_x = choose(less(path->direction_x, (real)0), (index)-1, (index)1);
-    walk->stride_y = choose(less(path->direction_y, (real)0), (index)-row, (index)row);
-    walk->stride_z = choose(less(path->direction_z, (real)0), (index)-slice, (index)slice);
-    dda_begin(path);
+    const Indices at = dda_begin(path, in_cells(path->ray.origin, scene), in_cells(path->ray.direction, scene),
+                                 scene->majorant.nx, scene->majorant.ny, scene->majorant.nz);
+    walk->cell = (at.z + 1) * slice + (at.y + 1) * row + (at.x + 1);
+    walk->stride.x = choose(less(path->ray.direction.x, (real)0), (index)-1, (index)1);
+    walk->stride.y = choose(less(path->ray.direction.y, (real)0), (index)-row, (index)row);
+    walk->stride.z = choose(less(path->ray.direction.z, (real)0), (index)-slice, (index)slice);
 }
 
 static real next_plane(const Path *path, const Scene *scene) { return dda_plane(path); }
@@ -43,6 +33,6 @@ static real next_plane(const Path *path, const Scene *scene) { return dda_plane(
 static void cross_plane(Path *path, const Scene *scene, const real plane, const mask crossing)
 {
     State *walk = &path->state;
-    const Crossed crossed = dda_cross(path, plane, crossing);
-    walk->cell += (crossed.x & walk->stride_x) + (crossed.y & walk->stride_y) + (crossed.z & walk->stride_z);
+    const Indices crossed = dda_cross(path, plane, crossing);
+    walk->cell += (crossed.x & walk->stride.x) + (crossed.y & walk->stride.y) + (crossed.z & walk->stride.z);
 }

@@ -1,16 +1,7 @@
 /*---
 title: The walk through the leaves of an octree of majorants
-state:
-  cell_x: index
-  cell_y: index
-  cell_z: index
-  leaf_size: index
-  pace_x: real
-  pace_y: real
-  pace_z: real
-  exit_x: real
-  exit_y: real
-  exit_z: real
+uses: [walk/in_cells]
+state: {cell: Indices, leaf_size: index, plane_pace: Vector, leaf_exits: Vector}
 ---*/
 /* The leaves are stored in a grid of the finest cells, each with the size of its leaf: finding a neighbour is
    one load and no descent. majorant_data has majorants, sizes and, where there are any, controls. What holds for
@@ -20,7 +11,7 @@ static real cell_value(const Path *path, const Scene *scene, const int layer)
 {
     const INTEGER n = (INTEGER)scene->majorant.resolution;
     const State *walk = &path->state;
-    const index cell = (walk->cell_z * n + walk->cell_y) * n + walk->cell_x;
+    const index cell = (walk->cell.z * n + walk->cell.y) * n + walk->cell.x;
     return gather(scene->majorant_data + layer * (int)scene->majorant.cells, cell);
 }
 
@@ -59,60 +50,48 @@ static void enter_leaf(Path *path, const Scene *scene, const mask entering)
     State *walk = &path->state;
     const SCALAR n = scene->majorant.resolution;
     const index size = to_index(cell_value(path, scene, 1));
-    const real where_x = path->origin_x * scene->majorant.cells_per_x;
-    const real where_y = path->origin_y * scene->majorant.cells_per_y;
-    const real where_z = path->origin_z * scene->majorant.cells_per_z;
-    const real exit_x = leaf_exit(path->t, walk->cell_x, size, where_x, walk->pace_x, n);
-    const real exit_y = leaf_exit(path->t, walk->cell_y, size, where_y, walk->pace_y, n);
-    const real exit_z = leaf_exit(path->t, walk->cell_z, size, where_z, walk->pace_z, n);
+    const Vector where = in_cells(path->ray.origin, scene);
+    const Vector exit = {leaf_exit(path->t, walk->cell.x, size, where.x, walk->plane_pace.x, n),
+                         leaf_exit(path->t, walk->cell.y, size, where.y, walk->plane_pace.y, n),
+                         leaf_exit(path->t, walk->cell.z, size, where.z, walk->plane_pace.z, n)};
     walk->leaf_size = choose(entering, size, walk->leaf_size);
-    walk->exit_x = choose(entering, exit_x, walk->exit_x);
-    walk->exit_y = choose(entering, exit_y, walk->exit_y);
-    walk->exit_z = choose(entering, exit_z, walk->exit_z);
+    take_vector(&walk->leaf_exits, &exit, entering);
 }
 
 static void cells_enter(Path *path, const Scene *scene)
 {
     State *walk = &path->state;
     const SCALAR n = scene->majorant.resolution;
-    const SCALAR x = scene->majorant.cells_per_x, y = scene->majorant.cells_per_y, z = scene->majorant.cells_per_z;
-    walk->pace_x = enter_axis(path->origin_x * x, path->direction_x * x, path->length, n, &walk->cell_x);
-    walk->pace_y = enter_axis(path->origin_y * y, path->direction_y * y, path->length, n, &walk->cell_y);
-    walk->pace_z = enter_axis(path->origin_z * z, path->direction_z * z, path->length, n, &walk->cell_z);
+    const real length = path->ray.length;
+    const Vector where = in_cells(path->ray.origin, scene), velocity = in_cells(path->ray.direction, scene);
+    walk->plane_pace.x = enter_axis(where.x, velocity.x, length, n, &walk->cell.x);
+    walk->plane_pace.y = enter_axis(where.y, velocity.y, length, n, &walk->cell.y);
+    walk->plane_pace.z = enter_axis(where.z, velocity.z, length, n, &walk->cell.z);
     enter_leaf(path, scene, (mask)-1);
 }
 
-static real next_plane(const Path *path, const Scene *scene)
-{
-    const State *walk = &path->state;
-    const real nearer = smaller(walk->exit_x, walk->exit_y);
-    return smaller(nearer, walk->exit_z);
-}
+static real next_plane(const Path *path, const Scene *scene) { return least_of(path->state.leaf_exits); }
 
 /* Along the axes whose plane is met the next cell follows from the leaf, exactly, so a walk cannot stall; along
    the others it is where the ray is, held inside the leaf. */
-static index next_cell(const index cell, const index size, const mask crossed, const mask forward, const real where)
+static index next_cell(const index cell, const index size, const real plane, const real exit, const real pace,
+                       const real where)
 {
     const index start = leaf_start(cell, size);
     const index within = clamp(to_index(where), start, start + size - 1);
-    return choose(crossed, choose(forward, start + size, start - 1), within);
+    const index beyond = choose(less((real)0, pace), start + size, start - 1);
+    return choose(~less(plane, exit), beyond, within);
 }
 
 static void cross_plane(Path *path, const Scene *scene, const real plane, const mask crossing)
 {
     State *walk = &path->state;
-    const real x = (path->origin_x + plane * path->direction_x) * scene->majorant.cells_per_x;
-    const real y = (path->origin_y + plane * path->direction_y) * scene->majorant.cells_per_y;
-    const real z = (path->origin_z + plane * path->direction_z) * scene->majorant.cells_per_z;
-    const index next_x =
-        next_cell(walk->cell_x, walk->leaf_size, ~less(plane, walk->exit_x), less((real)0, walk->pace_x), x);
-    const index next_y =
-        next_cell(walk->cell_y, walk->leaf_size, ~less(plane, walk->exit_y), less((real)0, walk->pace_y), y);
-    const index next_z =
-        next_cell(walk->cell_z, walk->leaf_size, ~less(plane, walk->exit_z), less((real)0, walk->pace_z), z);
-    walk->cell_x = choose(crossing, next_x, walk->cell_x);
-    walk->cell_y = choose(crossing, next_y, walk->cell_y);
-    walk->cell_z = choose(crossing, next_z, walk->cell_z);
+    const index size = walk->leaf_size;
+    const Vector where = in_cells(place_on(&path->ray, plane), scene);
+    const Indices next = {next_cell(walk->cell.x, size, plane, walk->leaf_exits.x, walk->plane_pace.x, where.x),
+                          next_cell(walk->cell.y, size, plane, walk->leaf_exits.y, walk->plane_pace.y, where.y),
+                          next_cell(walk->cell.z, size, plane, walk->leaf_exits.z, walk->plane_pace.z, where.z)};
+    take_indices(&walk->cell, &next, crossing);
     enter_leaf(path, scene, crossing);
     count(path->crossings, crossing);
 }

@@ -9,12 +9,9 @@ parameters:
 citation: Novak, Selle, Jarosz 2014, Residual ratio tracking for estimating attenuation in participating media
 ---*/
 /* Ratio tracking, whose small weights end or are raised: a path that is worth little costs little. */
-static void begin(Path *path, const Scene *scene, Rng *rng) { walk_begin(path, scene); }
-
-static void step(Path *path, const Scene *scene, Rng *rng)
+static void at_tentative(Path *path, const Scene *scene, Rng *rng, const mask here, const real sigma_t)
 {
-    const mask here = next_tentative(path, scene, rng);
-    const real sigma_n = path->majorant - sigma_t_at_tentative(path, scene, here);
+    const real sigma_n = path->majorant - sigma_t;
     const real weight = path->weight * (sigma_n / path->majorant);
     const real survival = fabs(weight) / scene->tracker.threshold;
     const mask plays = here & less(survival, (real)1);

@@ -18,17 +18,14 @@ estimands: [transmittance, free_path]
 needs: [majorant]
 bounding: false
 ---*/
-static void begin(Path *path, const Scene *scene, Rng *rng) { walk_begin(path, scene); }
-
-static void step(Path *path, const Scene *scene, Rng *rng)
+static void at_tentative(Path *path, const Scene *scene, Rng *rng, const mask here,
+                         const real sigma_t)
 {
-    const mask here = next_tentative(path, scene, rng);
-    const real sigma = sigma_t_at_tentative(path, scene, here);
-    const real null = path->majorant - sigma;
-    const real total = sigma + fabs(null);
-    const mask hit = here & less(uniform(rng) * total, sigma);
+    const real null = path->majorant - sigma_t;
+    const real total = sigma_t + fabs(null);
+    const mask hit = here & less(uniform(rng) * total, sigma_t);
     const real sign = choose(hit | ~less(null, (real)0), (real)1, (real)-1);
-    path->weight = choose(here, path->weight * sign * total * path->mean_free_path, path->weight);
+    path->weight = choose(here, path->weight * sign * total / path->majorant, path->weight);
     collide(path, hit);
 }
 """
@@ -62,7 +59,7 @@ static void step(Path *path, const Scene *scene, Rng *rng)
 """
 TRACKERS = {"signed_delta": SIGNED_DELTA, "kept_ratio": KEPT_RATIO}
 WRONG = {
-    "signed_delta": [("* sign *", "*"), ("sign * total * path->mean_free_path", "sign")],
+    "signed_delta": [("* sign *", "*"), ("sign * total / path->majorant", "sign")],
     "kept_ratio": [
         ("/ scene->tracker.scale", ""),
         ("((SCALAR)1 - real_share)", "exp(-real_share)"),

@@ -101,3 +101,14 @@ def test_a_tracker_of_shadow_rays_brings_the_mathematics_that_it_uses(rig):
     flight = radiance(rig, medium, light=POINT, scatterings=1, shadow="unbiased_march")
     assert "symmetric_means" in flight.runner.program.source.text
     check_mean(flight.run(4096).moments, flight.reference(), 1e-4)
+
+
+def test_a_shadow_ray_may_march(rig):
+    """A parameter of its is called `step`, which is a function of OpenCL, and of PoCL a macro."""
+    medium = {"homogeneous": {"sigma_t": 2.0, "albedo": 0.8}}
+    lit = {"medium": medium, "light": POINT, "scatterings": 1, "lanes": 1}
+    marched, exact = (
+        radiance(rig, shadow=shadow, **lit).record(32).score for shadow in ("march", "regular")
+    )
+    np.testing.assert_allclose(marched, exact, rtol=1e-4, atol=1e-6)
+    assert exact.max() > 0

@@ -15,28 +15,28 @@ from typing import NamedTuple
 RIGHT = (Path(__file__).parents[1] / "data" / "ratio_roulette.cl").read_text("utf-8")
 NAME = "newcomer"
 NULL = "(sigma_n / path->majorant)"
-ENDS = "static void step(Path *path, const Scene *scene, Rng *rng)\n{"
-SIGMA = "    const real sigma = sigma_t_at_tentative(path, scene, here);"
-TENTATIVE = "    const mask here = next_tentative(path, scene, rng);"
+GIVEN = "(Path *path, const Scene *scene, Rng *rng"
+DECIDES = f"static void at_tentative{GIVEN}, const mask here, const real sigma_t)\n{{"
+BEGINS = f"static void begin{GIVEN}) {{ walk_begin(path, scene); }}\n\n"
+STEPS = f"static void step{GIVEN})\n{{"
 ALL = f"identity/{NAME}/transmittance/"
 TOO_LOW = f"hard/non-bounding/0.5/{NAME}"
 
 
 class Slip(NamedTuple):
-    """What it is, what changes in the file (or its whole last step), and a check that fails."""
+    """What it is, what changes in the file (or its whole function), and a check that fails."""
 
     what: str
     changes: tuple[tuple[str, str], ...]
     check: str
-    step: str = ""
+    instead: str = ""
 
     @property
     def text(self) -> str:
         """The wrong tracker."""
         text = RIGHT
-        if self.step:
-            before, _, _ = text.partition(ENDS)
-            text = f"{before}{ENDS}\n{self.step.strip()}\n}}\n"
+        if self.instead:
+            text = f"{text.partition(DECIDES)[0]}{self.instead.strip()}\n}}\n"
         for old, new in self.changes:
             assert text.count(old) == 1, (self.what, old)
             text = text.replace(old, new)
@@ -73,10 +73,7 @@ SLIPS = (
         "the majorant of the first collision at all of them",
         (
             ("parameters:", "state: {first: real}\nparameters:"),
-            (
-                "walk_begin(path, scene); }",
-                "walk_begin(path, scene); path->state.first = (real)0; }",
-            ),
+            (DECIDES, BEGINS.replace("; }", "; path->state.first = (real)0; }") + DECIDES),
             (
                 f"    const real weight = path->weight * {NULL};",
                 "    const mask unknown = here & equal(path->state.first, (real)0);\n"
@@ -90,10 +87,9 @@ SLIPS = (
         "a uniform number that is used twice",
         (("bounding: false", "bounding: true"),),
         ALL + "trilinear/grid",
-        f"""{TENTATIVE}
-{SIGMA}
+        f"""{DECIDES}
     const real u = uniform(rng);
-    const mask hit = here & less(u * path->majorant, sigma);
+    const mask hit = here & less(u * path->majorant, sigma_t);
     const mask culled = here & ~hit & less((real)0.9, u);
     path->weight = choose(here, path->weight / (SCALAR)0.9, path->weight);
     collide(path, hit | culled);""",
@@ -101,11 +97,11 @@ SLIPS = (
     Slip(
         "a lookup that is not counted",
         (
+            (DECIDES, f"{BEGINS}{STEPS}\n    const mask here = next_tentative(path, scene, rng);"),
             (
-                "sigma_t_at_tentative(path, scene, here)",
-                "sigma_t_at(scene, path->origin_x + path->t * path->direction_x,\n"
-                "        path->origin_y + path->t * path->direction_y,\n"
-                "        path->origin_z + path->t * path->direction_z)",
+                "path->majorant - sigma_t;",
+                "path->majorant - sigma_t_at(scene, place_on(&path->ray, path->t).x,\n"
+                "        place_on(&path->ray, path->t).y, place_on(&path->ray, path->t).z);",
             ),
         ),
         f"lookups/counted/{NAME}",
@@ -114,25 +110,22 @@ SLIPS = (
         "a march that claims to be unbiased",
         (
             ("needs: [majorant]", "needs: []"),
-            ("walk_begin(path, scene); ", ""),
             ("{default: 0.1, above: 0, maximum: 1,", "{unit: length, default: 0.1, above: 0,"),
         ),
         ALL + "trilinear/global",
-        """
+        f"""{BEGINS.replace("walk_begin(path, scene); ", "")}{STEPS}
     const real next = to_real(path->steps) * scene->tracker.threshold;
-    const real t_exit = smaller(next, path->length);
+    const real t_exit = smaller(next, path->ray.length);
     const real sigma = sigma_t(path, scene, path->t, path->live);
     path->weight = choose(path->live, path->weight * exp(sigma * (path->t - t_exit)), path->weight);
     path->t = choose(path->live, t_exit, path->t);
-    escape(path, path->live & ~less(t_exit, path->length));""",
+    escape(path, path->live & ~less(t_exit, path->ray.length));""",
     ),
     Slip(
         "delta tracking that claims to need no bound",
         (),
         TOO_LOW,
-        f"""{TENTATIVE}
-{SIGMA}
-    collide(path, here & less(uniform(rng) * path->majorant, sigma));""",
+        f"{DECIDES}\n    collide(path, here & less(uniform(rng) * path->majorant, sigma_t));",
     ),
 )
 
