@@ -49,14 +49,11 @@ def load_text(tmp_path, monkeypatch, small_catalog):
 
 @pytest.fixture(scope="session")
 def device():
-    """The PoCL that comes with pip where it is installed, else the first device."""
+    """$FREEPATH_TEST_DEVICE, else what a run without -d takes."""
     from freepath.device import open_devices
-    from freepath.errors import DeviceError
 
-    try:
-        return open_devices(["3.0"])[0]
-    except DeviceError:
-        return open_devices([])[0]
+    chosen = os.environ.get("FREEPATH_TEST_DEVICE")
+    return open_devices([chosen] if chosen else [])[0]
 
 
 @pytest.fixture
@@ -77,22 +74,7 @@ def work(tmp_path, monkeypatch):
 
 
 @pytest.fixture(scope="session")
-def device_under_test():
-    """$FREEPATH_TEST_DEVICE, else the PoCL that comes with pip, else the first device."""
-    from freepath.device import open_devices
-    from freepath.errors import DeviceError
-
-    chosen = os.environ.get("FREEPATH_TEST_DEVICE")
-    if chosen:
-        return open_devices([chosen])[0]
-    try:
-        return open_devices(["3.0"])[0]
-    except DeviceError:
-        return open_devices([])[0]
-
-
-@pytest.fixture(scope="session")
-def rig(device_under_test, tmp_path_factory):
+def rig(device, tmp_path_factory):
     from freepath.check.rig import Rig
 
-    return Rig(device_under_test, catalog.load(), tmp_path_factory.mktemp("rig"))
+    return Rig(device, catalog.load(), tmp_path_factory.mktemp("rig"))
