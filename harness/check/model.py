@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 from freepath.catalog import Tracker
@@ -78,6 +79,18 @@ class Check:
     kernels: str = field(default="", compare=False)
     """Checks of the same ones are run by the same process, which compiles them once."""
 
+    @classmethod
+    def of(
+        cls, name: str, labels: tuple[str, ...], function: Callable[..., None], /, **options: Any
+    ) -> Check:
+        """A check whose `run` calls a function with `options`; its docstring is the sentence.
+
+        But for `sentence`, `applies` and `kernels`, which are the check's own.
+        """
+        own = {key: options.pop(key) for key in ("applies", "kernels") if key in options}
+        sentence = options.pop("sentence", function.__doc__ or "")
+        return cls(name, labels, " ".join(sentence.split()), partial(function, **options), **own)
+
     def reason_against(self, info: DeviceInfo) -> str:
         """Why it cannot be made on a device, or ''."""
         if info.interpreted and TINY not in self.labels:
@@ -88,15 +101,6 @@ class Check:
     def in_tests(self) -> bool:
         """Whether the tests run it too: all but those that take minutes."""
         return "minutes" not in self.labels
-
-
-def of_tracker(tracker: Tracker, situation: Callable[..., None], **options: Any) -> Any:
-    """A check's `run`: a situation for a tracker, `situation(rig, alpha, tracker, **options)`."""
-
-    def run(rig: Rig, alpha: float) -> None:
-        situation(rig, alpha, tracker, **options)
-
-    return run
 
 
 def majorant_of(tracker: Tracker, wanted: str = "grid") -> str:
