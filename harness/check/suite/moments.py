@@ -35,10 +35,10 @@ RELATIVES: dict[str, tuple[dict[str, Any], float, Callable[..., known.Expected]]
     "split": ({}, 1.5, known.ratio),
     "residual_ratio": ({}, 1.5, known.residual_ratio),
     "residual_ratio-1.2": ({"control": "minorant", "share": 1.2}, 1.5, known.residual_ratio),
-    "decomposition": ({}, 1.5, known.decomposition),
+    "decomposition": ({}, 1.5, known.binary),
     "weighted_decomposition": ({"share": 0.3}, 1.5, known.weighted_decomposition),
-    "next_flight_delta": ({}, 1.5, known.binary_cost),
-    "next_flight_ratio": ({}, 1.5, known.ratio_cost),
+    "next_flight_delta": ({}, 1.5, known.cost_of(known.binary)),
+    "next_flight_ratio": ({}, 1.5, known.cost_of(known.ratio)),
     "track_length": ({}, 1.5, known.track_length_cost),
 }  # fmt: skip
 
