@@ -176,12 +176,7 @@ class Rig:
         return case
 
     def flight(
-        self,
-        *,
-        lines: Lines | None = None,
-        count: bool = True,
-        record: bool = True,
-        **axes: Any,
+        self, *, lines: Lines | None = None, count: bool = True, record: bool = True, **axes: Any
     ) -> Flight:
         """Build a case. `lines` are origins and directions of its rays, not random chords."""
         case = self.case(**axes)

@@ -10,15 +10,7 @@ from freepath.catalog import Tracker
 from freepath.check.cases import check_samples
 from freepath.check.identities import check_clean
 from freepath.check.rig import Rig
-from freepath.check.suite.common import (
-    UPWARD,
-    VOXELS,
-    Checks,
-    everyone,
-    knows_depth,
-    unit,
-    voxels,
-)
+from freepath.check.suite.common import UPWARD, VOXELS, Checks, everyone, knows_depth, unit, voxels
 from freepath.check.suite.thickness import WITHIN_1
 from freepath.check.truth import MajorantAlongRays
 from freepath.check.verdict import demand, require
@@ -162,11 +154,7 @@ def from_afar(rig: Rig, alpha: float, tracker: Tracker) -> None:
 
 @checks.hard("contrast/million", everyone)
 def contrast(
-    rig: Rig,
-    alpha: float,
-    tracker: Tracker,
-    ends: tuple[float, float] = (1e6, 1e-42),
-    **axes: Any,
+    rig: Rig, alpha: float, tracker: Tracker, ends: tuple[float, float] = (1e6, 1e-42), **axes: Any
 ) -> None:
     """Between neighbours of 0 and 10^6 interpolation and majorants overflow their neighbours, and a
     denormal density is flushed or divided by."""

@@ -10,15 +10,7 @@ from freepath.check.cases import check_samples
 from freepath.check.identities import check_clean, check_mean
 from freepath.check.model import is_bounding
 from freepath.check.rig import Rig
-from freepath.check.suite.common import (
-    FEW,
-    UPWARD,
-    Checks,
-    homogeneous,
-    splits_off,
-    voxels,
-    walks,
-)
+from freepath.check.suite.common import FEW, UPWARD, Checks, homogeneous, splits_off, voxels, walks
 from freepath.check.verdict import Failure, demand, hearing
 from freepath.runner import STEP_CAP
 from scipy import stats
