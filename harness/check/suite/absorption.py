@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from freepath.check.identities import check_clean, check_mean, check_variance
 from freepath.check.rig import Rig
-from freepath.check.suite.channels import check_channels
+from freepath.check.suite.channels import check_any, check_channels
 from freepath.check.suite.common import Checks
 from freepath.check.suite.near_light import double
 from freepath.check.suite.scattering import CLOUD, FEW, POINT, follow, homogeneous, rod_model
@@ -110,10 +110,7 @@ def unlimited(rig: Rig, alpha: float, tracker: str) -> None:
 
 def _agree(one: Moments, other: Moments, alpha: float) -> None:
     joint = Moments(one.count, one.mean, one.m2 + other.m2)
-    if one.mean.ndim == 1:
-        check_mean(joint, other.mean, alpha)
-    else:
-        check_channels(joint, other.mean, alpha)
+    check_any(joint, other.mean, alpha)
 
 
 def _declare() -> None:

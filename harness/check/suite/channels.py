@@ -47,6 +47,11 @@ def check_channels(moments: Moments, expected: np.ndarray, alpha: float) -> None
         check_mean(one, wanted, alpha / expected.shape[1])
 
 
+def check_any(moments: Moments, expected: np.ndarray, alpha: float) -> None:
+    """The mean of one channel or of each."""
+    (check_mean if moments.mean.ndim == 1 else check_channels)(moments, expected, alpha)
+
+
 def mean(rig: Rig, alpha: float, probability: str, axes: dict[str, Any]) -> None:
     """One path serves all channels: a weight that is another channel's, or not divided by the
     probability of what happened, biases some of them and leaves the first right."""

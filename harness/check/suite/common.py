@@ -14,10 +14,11 @@ from freepath.check.rig import Flight, Rig
 FEW = {"chords": {"count": 16}}
 UPWARD = {"orthographic": {"resolution": [4, 4]}}
 GRID = {"grid": {"resolution": 4}}
-CELLS = 8
-# A unit cube of which about half of the voxels are empty.
+COUNTS = (12, 4, 8)
+# A unit cube [z, y, x] of which about half of the voxels are empty. The counts differ, and so do
+# the sizes of a voxel: a stride or size of another axis shows. Faces are at each quarter of it.
 _RANDOM = np.random.default_rng(4)
-VOXELS = 4.0 * _RANDOM.random((CELLS,) * 3) * (_RANDOM.random((CELLS,) * 3) > 0.5)
+VOXELS = 4.0 * _RANDOM.random(COUNTS) * (_RANDOM.random(COUNTS) > 0.5)
 
 Wanted = Callable[[Tracker], bool]
 Labels = tuple[str, ...]
@@ -136,7 +137,7 @@ def voxels(
         inner = [length * i / count for i in range(1, count)]
         layers = {"breakpoints": inner, "values": column, "size": [length] * 3}
         return fly(rig, tracker, {"layered": layers}, length, **axes)
-    size = length / len(values)
+    size = [length / count for count in values.shape[::-1]]
     medium = rig.volume(values, voxel_size=size, sigma_t=1.0 / length, interpolation=interpolation)
     return fly(rig, tracker, medium, length, **axes)
 

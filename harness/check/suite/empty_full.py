@@ -46,8 +46,8 @@ def half_empty(rig: Rig, alpha: float, tracker: Tracker) -> None:
     """A cell of majorant 0 has no mean free path; what is left of a draw must be carried through it
     unchanged."""
     # The lower half is empty, the upper is not.
-    values = np.zeros((16,) * 3)
-    values[8:] = 3.0 * np.random.default_rng(8).random((8, 16, 16))
+    values = np.zeros((16, 4, 12))
+    values[8:] = 3.0 * np.random.default_rng(8).random((8, 4, 12))
     flight = voxels(rig, tracker, values, seed=rig.seed + 1)
     check_samples(flight, flight.record(1024), alpha)
 

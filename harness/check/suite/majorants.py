@@ -31,7 +31,7 @@ checks = Checks()
 
 def _thin_voxels() -> np.ndarray:
     """An optical depth of about 0.2: so that weights stay known at a tenth of the majorant."""
-    return 0.3 * np.random.default_rng(11).random((8,) * 3) + 0.05
+    return 0.3 * np.random.default_rng(11).random((9, 5, 7)) + 0.05
 
 
 def not_bounding(rig: Rig, alpha: float, tracker: Tracker, tightness: float) -> None:

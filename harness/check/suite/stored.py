@@ -55,7 +55,7 @@ def denormal(rig: Rig, alpha: float, tracker: Tracker) -> None:
     check_samples(flight, flight.record(2048), alpha)
 
 
-_CENTRES = np.stack(np.meshgrid(*[np.arange(len(VOXELS)) + 0.5] * 3), axis=-1).reshape(-1, 3)
+_CENTRES = np.argwhere(VOXELS >= 0.0)[:, ::-1] + 0.5
 
 
 @checks.hard("contrast/half-rounded", in_voxels)
