@@ -88,7 +88,7 @@ def check(
 ) -> list[Outcome]:
     """Run checks of a tracker on a device, in processes of their own."""
     timeout = TIMEOUT_S if all("fast" in one.labels for _, one in chosen) else 5 * TIMEOUT_S
-    options = checking.Options(processes=processes, trackers=(file,), timeout=timeout)
+    options = checking.Options(parallel=processes, trackers=(file,), timeout=timeout)
     return checking.Session(chosen, options, tell).run(info)
 
 

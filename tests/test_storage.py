@@ -212,7 +212,7 @@ ROUNDED = next(
 
 
 def test_majorants_of_the_unrounded_densities_are_caught(rig, monkeypatch):
-    """The planted defect of the host: those of kernels are among freepath.check.planted."""
+    """The planted defect of the host: others are in harness/check/planted.yaml."""
     ROUNDED.run(rig, LEVEL)
     right = GridMedium.stored
 

@@ -6,38 +6,63 @@ prints the table of docs/defects.md.
 
 from __future__ import annotations
 
+import inspect
 import sys
 import tempfile
-from collections.abc import Sequence
+import textwrap
+from collections.abc import Callable, Sequence
+from importlib import resources
 from pathlib import Path
+from pkgutil import resolve_name
+from typing import Any, NamedTuple
+from unittest import mock
 
 from freepath import catalog
 from freepath.check import registry
 from freepath.check.model import LEVEL, Check
-from freepath.check.planted import KERNELS, Defect
-from freepath.check.planted_host import HOST, HostDefect, planted
-from freepath.check.planted_numbers import NUMBERS
-from freepath.check.planted_paths import PATHS
 from freepath.check.rig import Change, Rig
 from freepath.check.verdict import Failure
 from freepath.errors import FAILED
 from freepath.selection import one_device
+from ruamel.yaml import YAML
 
-DEFECTS: tuple[Defect | HostDefect, ...] = KERNELS + NUMBERS + PATHS + HOST
+
+class Defect(NamedTuple):
+    """A slip of a hand: what it is, a piece of the source and what is in its place, who sees it."""
+
+    what: str
+    old: str
+    new: str
+    check: str
+    function: str = ""
+    """Of the host, as module.name where it is looked up; '' for the source of a kernel."""
 
 
-def caught(rig: Rig, defect: Defect | HostDefect, check: Check) -> str:
+def _read() -> tuple[Defect, ...]:
+    text = resources.files("freepath.check").joinpath("planted.yaml").read_text("utf-8")
+    found = []
+    for entry in YAML(typ="safe").load(text):
+        what, check = next(iter(entry.items()))
+        found.append(Defect(what, entry["old"], entry["new"], check, entry.get("in", "")))
+    return tuple(found)
+
+
+DEFECTS = _read()
+
+
+def caught(rig: Rig, defect: Defect, check: Check) -> str:
     """What the check says of the changed program; '' where it finds nothing wrong.
 
     Raises LookupError where the check uses nothing with a place for the defect.
     """
+    change = Change(defect.old, defect.new)
     try:
-        if isinstance(defect, HostDefect):
-            with planted(defect) as function:
+        if defect.function:
+            wrong = _changed(resolve_name(defect.function), change)
+            with mock.patch(defect.function, side_effect=wrong, autospec=True) as patched:
                 check.run(rig.without_scenes(), LEVEL)
-            used = function.called
+            used = patched.called
         else:
-            change = Change(defect.old, defect.new)
             check.run(rig.with_change(change), LEVEL)
             used = bool(change.planted)
     except Failure as failure:
@@ -45,6 +70,15 @@ def caught(rig: Rig, defect: Defect | HostDefect, check: Check) -> str:
     if not used:
         raise LookupError(f"{check.name} builds nothing with a place for '{defect.what}'")
     return ""
+
+
+def _changed(function: Callable[..., Any], change: Change) -> Callable[..., Any]:
+    """The function made of its changed text."""
+    names = dict(function.__globals__)
+    exec(change.apply(textwrap.dedent(inspect.getsource(function))), names)
+    if not change.planted:
+        raise LookupError(f"{function.__qualname__} has no place for {change.old!r}")
+    return names[function.__name__]
 
 
 def main(arguments: Sequence[str]) -> int:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 import re
 import sys
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from freepath.check.model import Check
@@ -44,7 +44,6 @@ def write_junit(path: Path | None, by_device: dict[str, list[Outcome]]) -> None:
         report.add_testsuite(suite)
     report.update_statistics()
     with _written(path):
-        path.parent.mkdir(parents=True, exist_ok=True)
         report.write(str(path), pretty=True)
 
 
@@ -53,18 +52,14 @@ def _printable(text: str) -> str:
     return re.sub(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]", "?", text)
 
 
-class _written:  # noqa: N801 (a context manager, as those of contextlib)
-    """Turns what the file system refuses into a UsageError."""
-
-    def __init__(self, path: Path):
-        self._path = path
-
-    def __enter__(self) -> None:
-        pass
-
-    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
-        if isinstance(error, OSError):
-            raise UsageError(f"{self._path}: cannot be written: {error.strerror}") from error
+@contextmanager
+def _written(path: Path) -> Iterator[None]:
+    """Make a folder for it; what the file system refuses is a UsageError."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        yield
+    except OSError as error:
+        raise UsageError(f"{path}: cannot be written: {error.strerror}") from error
 
 
 def write_ctest(
@@ -85,7 +80,6 @@ def write_ctest(
         ]
     path = folder / "CTestTestfile.cmake"
     with _written(path):
-        folder.mkdir(parents=True, exist_ok=True)
         path.write_text("\n".join(lines) + "\n", "utf-8")
     return path
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 from freepath.catalog import Tracker
@@ -19,38 +20,15 @@ what else is selected nor on which trackers were added."""
 LEVEL = sidak(BUDGET, MOST_CHECKS)
 
 TINY = "tiny"
-GROUPS = {
-    "random-numbers": "generators, and samplers at the ends of their domain",
-    "empty-full": "nothing, one voxel, and all voxels alike",
-    "thin": "optical depths of 1e-7 and 1e-12",
-    "thick": "optical depths of 50, a thousand and a million",
-    "non-bounding": "majorants below the extinction",
-    "loose": "majorants a thousand and a million times too high",
-    "residual": "null collisions and controls where nothing is left over",
-    "geometry": "rays along axes, faces and edges, through corners, without length",
-    "scale": "units and places",
-    "contrast": "neighbours of 0 and a million, denormal densities, half floats",
-    "accumulation": "a thousand million samples",
-    "long-runs": "numbers beyond 32 bits, launches that are cut",
-    "scattering": "furnaces, emission, phase functions, lights beside a ray and far away",
-    "p_absorb": "paths absorbed with a chance of one's choice: none, some, as the albedo says",
-    "channels": "several channels on one path: a thousand to one, nothing, their albedos",
-    "bad-input": "volumes that must be refused",
-}
+GROUPS = (
+    *("random-numbers", "empty-full", "thin", "thick", "non-bounding", "loose", "residual"),
+    *("geometry", "scale", "contrast", "accumulation", "long-runs", "scattering", "p_absorb"),
+    *("channels", "bad-input"),
+)
 """The hard cases, by group: each is a label."""
-LABELS = {
-    "fast": "takes little time together: the first thing to run",
-    "slow": "the rest",
-    "minutes": "takes minutes alone",
-    TINY: "so little that an interpreter of kernels gets through it",
-    "smoke": "each tracker, a few paths",
-    "identity": "means agree with float64",
-    "distribution": "free paths have the distribution of the medium",
-    "moments": "variances and costs agree with what is known of them",
-    "hard": "what breaks trackers in float32",
-    **GROUPS,
-}
-"""What -L finds; the name of its tracker is a label of a check too."""
+KINDS = ("smoke", "identity", "distribution", "moments", "hard")
+LABELS = ("fast", "slow", "minutes", TINY, *KINDS, *GROUPS)
+"""What -L finds, as docs/checks.md explains it; a tracker's name is a label of its checks too."""
 
 
 def always(info: DeviceInfo) -> str:
@@ -78,6 +56,18 @@ class Check:
     kernels: str = field(default="", compare=False)
     """Checks of the same ones are run by the same process, which compiles them once."""
 
+    @classmethod
+    def of(
+        cls, name: str, labels: tuple[str, ...], function: Callable[..., None], /, **options: Any
+    ) -> Check:
+        """A check whose `run` calls a function with `options`; its docstring is the sentence.
+
+        But for `sentence`, `applies` and `kernels`, which are the check's own.
+        """
+        own = {key: options.pop(key) for key in ("applies", "kernels") if key in options}
+        sentence = options.pop("sentence", function.__doc__ or "")
+        return cls(name, labels, " ".join(sentence.split()), partial(function, **options), **own)
+
     def reason_against(self, info: DeviceInfo) -> str:
         """Why it cannot be made on a device, or ''."""
         if info.interpreted and TINY not in self.labels:
@@ -88,15 +78,6 @@ class Check:
     def in_tests(self) -> bool:
         """Whether the tests run it too: all but those that take minutes."""
         return "minutes" not in self.labels
-
-
-def of_tracker(tracker: Tracker, situation: Callable[..., None], **options: Any) -> Any:
-    """A check's `run`: a situation for a tracker, `situation(rig, alpha, tracker, **options)`."""
-
-    def run(rig: Rig, alpha: float) -> None:
-        situation(rig, alpha, tracker, **options)
-
-    return run
 
 
 def majorant_of(tracker: Tracker, wanted: str = "grid") -> str:

@@ -24,5 +24,4 @@ class Outcome:
 
     @property
     def wrong(self) -> bool:
-        """Whether it failed, in whatever way."""
         return self.status in WRONG

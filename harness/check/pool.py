@@ -35,10 +35,9 @@ class Task:
     def ended(
         self, status: str, seconds: float, text: str, p_value: float | None = None
     ) -> Outcome:
-        """What became of it."""
-        name, labels = self.check.name, self.check.labels
+        one = self.check
         return Outcome(
-            self.number, name, labels, status, seconds, text, repeat=self.repeat, p_value=p_value
+            self.number, one.name, one.labels, status, seconds, text, self.repeat, p_value
         )
 
 
@@ -60,7 +59,6 @@ class Worker:
         self.since = time.monotonic()
 
     def start(self, task: Task) -> None:
-        """Hand it a check."""
         self.task, self.since = task, time.monotonic()
         with suppress(BrokenPipeError):  # it has died: that is seen when its answer is read
             self.connection.send((task.check.name, task.repeat))
@@ -71,14 +69,12 @@ class Worker:
         return self.since + allowed - time.monotonic()
 
     def stop(self) -> None:
-        """End it, whatever it does."""
         self.connection.close()
         self.process.kill()
         self.process.join()
         self.folder.cleanup()
 
     def crash(self) -> str:
-        """Why it died."""
         self.process.join()
         code = self.process.exitcode or 0
         if code >= 0:

@@ -35,11 +35,9 @@ class Progress:
         self._name_width = max(len(check.name) for _, check in checks)
 
     def start(self, number: int, name: str) -> str:
-        """As it starts."""
         return f"      Start {number:>{self._number_width}}: {name}"
 
     def end(self, outcome: Outcome) -> str:
-        """As it ends."""
         self._done += 1
         width = len(str(self._total))
         name = f"{outcome.name} ".ljust(self._name_width + 4, ".")

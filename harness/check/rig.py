@@ -64,7 +64,6 @@ class Flight:
 
     @property
     def medium(self) -> Medium:
-        """The medium as it is given."""
         return self.scene.medium
 
     @property
@@ -74,7 +73,6 @@ class Flight:
 
     @property
     def depth(self) -> np.ndarray:
-        """The optical depth of each ray."""
         return self.scene.depth
 
     @property
@@ -83,7 +81,6 @@ class Flight:
         return float(np.finfo(scalar_type(self.case.arithmetic)).eps) / 2
 
     def reference(self) -> np.ndarray:
-        """The exact value of each ray."""
         return self.scene.reference(self.case)
 
     def as_stored(self) -> Flight:
@@ -96,7 +93,6 @@ class Flight:
         return self.runner.run(first, samples, blocks, record=self.recording, **options)
 
     def record(self, samples: int, blocks: int = 1, **options: Any) -> Samples:
-        """Take samples and keep each."""
         return Samples(self.run(samples, blocks, **options), blocks, samples)
 
 
@@ -116,42 +112,34 @@ class Rig:
         self._cases: dict[str, Case] = {}
         self._kept: dict[Any, tuple[Scene, Scene]] = {}
 
-    def with_trackers(self, catalog: Catalog) -> Rig:
-        """The same rig for another catalog; it shares what is built, as those below do."""
+    # the same rig with something else, which shares what is built
+
+    def _with(self, **others: Any) -> Rig:
         rig = copy(self)
-        rig.catalog = catalog
-        rig._cases = {}
+        vars(rig).update(others)
         return rig
+
+    def with_trackers(self, catalog: Catalog) -> Rig:
+        return self._with(catalog=catalog, _cases={})
 
     def with_seed(self, seed: int) -> Rig:
-        """The same rig with other random numbers."""
-        rig = copy(self)
-        rig.seed = seed
-        return rig
+        return self._with(seed=seed)
 
     def without_scenes(self) -> Rig:
-        """The same rig with nothing kept of scenes: for what changes how they are made."""
-        rig = copy(self)
-        rig._kept = {}
-        return rig
+        """With nothing kept of scenes: for what changes how they are made."""
+        return self._with(_kept={})
 
     def with_arithmetic(self, name: str) -> Rig:
-        """The same rig with another arithmetic of flights that do not name theirs."""
-        rig = copy(self)
-        rig.arithmetic = name
-        return rig
+        """Of flights that do not name theirs."""
+        return self._with(arithmetic=name)
 
     def with_storage(self, name: str) -> Rig:
-        """The same rig with another storage of voxels in flights that do not name theirs."""
-        rig = copy(self)
-        rig.storage = name
-        return rig
+        """Of voxels in flights that do not name theirs."""
+        return self._with(storage=name)
 
     def with_change(self, change: Change) -> Rig:
-        """The same rig with a defect in each source that has a place for it."""
-        rig = copy(self)
-        rig._changes = (*self._changes, change)
-        return rig
+        """With a defect in each source that has a place for it."""
+        return self._with(_changes=(*self._changes, change))
 
     def volume(self, voxels: np.ndarray, **keys: Any) -> dict[str, Any]:
         """A medium of a config from voxels [z, y, x], by way of a file as a user gives them."""
@@ -188,12 +176,7 @@ class Rig:
         return case
 
     def flight(
-        self,
-        *,
-        lines: Lines | None = None,
-        count: bool = True,
-        record: bool = True,
-        **axes: Any,
+        self, *, lines: Lines | None = None, count: bool = True, record: bool = True, **axes: Any
     ) -> Flight:
         """Build a case. `lines` are origins and directions of its rays, not random chords."""
         case = self.case(**axes)
@@ -237,7 +220,6 @@ class Rig:
         return made
 
     def program(self, text: Source) -> Program:
-        """Build a source, each only once."""
         for change in self._changes:
             text = Source(change.apply(text.text), text.options)
         if text.sha256 not in self._programs:

@@ -27,20 +27,11 @@ class Samples:
         column = self._column(index)
         return column.reshape(len(column), -1)
 
-    @cached_property
-    def t(self) -> np.ndarray:
-        """Where each ended."""
-        return self._flat(0)
-
-    @cached_property
-    def weight(self) -> np.ndarray:
-        """What each weighed there."""
-        return self._flat(1)
-
-    @cached_property
-    def escaped(self) -> np.ndarray:
-        """Whether each left the medium."""
-        return self._flat(2) > 0
+    # where each ended, what it weighed there, what it contributes to the mean
+    t = cached_property(lambda self: self._flat(0))
+    weight = cached_property(lambda self: self._flat(1))
+    score = cached_property(lambda self: self._flat(4))
+    escaped = cached_property(lambda self: self._flat(2) > 0)
 
     @cached_property
     def lookups(self) -> np.ndarray:
@@ -49,17 +40,11 @@ class Samples:
         return count.reshape(len(count), -1)
 
     @cached_property
-    def score(self) -> np.ndarray:
-        """What each contributes to the mean."""
-        return self._flat(4)
-
-    @cached_property
     def weights(self) -> np.ndarray:
         """Of each channel, (channels, rays, samples); `weight` is that of the first."""
-        width = self._recorded.shape[-1]
-        return np.array([self._flat(index) for index in (1, *range(5, width, 2))])
+        return np.array([self._flat(i) for i in (1, *range(5, self._recorded.shape[-1], 2))])
 
     @cached_property
     def scores(self) -> np.ndarray:
         """Of each channel, (channels, rays, samples); `score` is that of the first."""
-        return np.array([self._flat(index) for index in range(4, self._recorded.shape[-1], 2)])
+        return np.array([self._flat(i) for i in range(4, self._recorded.shape[-1], 2)])

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import textwrap
+from argparse import Namespace
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
-from functools import partial
-from pathlib import Path
+from dataclasses import dataclass, field, fields, replace
 
 from freepath import drivers
 from freepath.check import printing
@@ -21,19 +20,21 @@ Chosen = Sequence[tuple[int, Check]]
 
 
 @dataclass(frozen=True)
-class Options:
+class Options(Setting):
     """How checks are run, and what is told of them."""
 
-    processes: int = 1
+    parallel: int = 1
     timeout: float = 300.0
     repeat: int = 1
-    seed: int | None = None
-    trackers: Sequence[Path] = ()
-    arithmetic: str = "strict"
-    storage: str = "float"
     stop_on_failure: bool = False
     output_on_failure: bool = False
     verbose: bool = False
+
+    @classmethod
+    def of(cls, options: Namespace) -> Options:
+        """Those of the command line that are given; the device is each session's own."""
+        names = {one.name for one in fields(cls)} - {"device"}
+        return cls(**{k: v for k, v in vars(options).items() if k in names and v is not None})
 
 
 @dataclass
@@ -48,7 +49,9 @@ class Session:
 
     def run(self, info: DeviceInfo) -> list[Outcome]:
         """Run all on a device; raises DeviceError where it cannot be used at all."""
-        options = self.options
+        seen = drivers.current()
+        seen_name = seen.name if seen else ""
+        options = replace(self.options, device=selector_of(info), driver=seen_name)
         ended = self.outcomes.setdefault(info.label, [])
         tasks = [
             Task(number, check, repeat)
@@ -56,22 +59,16 @@ class Session:
             for number, check in self.chosen
         ]
         progress = printing.Progress(self.chosen, len(tasks))
-        setting = Setting(
-            selector_of(info),
-            seen.name if (seen := drivers.current()) else "",
-            trackers=tuple(options.trackers),
-            arithmetic=options.arithmetic,
-            storage=options.storage,
-        )
-        if options.seed is not None:
-            setting = replace(setting, seed=options.seed)
-        pool = Pool(
-            setting,
-            options.processes,
-            options.timeout,
-            lambda task: self.tell(progress.start(task.number, task.check.name)),
-        )
-        for outcome in map(partial(_with_seed, setting), pool.outcomes(tasks)):
+
+        def started(task: Task) -> None:
+            self.tell(progress.start(task.number, task.check.name))
+
+        for one in Pool(options, options.parallel, options.timeout, started).outcomes(tasks):
+            outcome = one
+            if one.wrong and one.repeat:
+                # it fails again with its seed
+                text = f"--seed {options.seed_of(one.repeat)}: {one.text}"
+                outcome = replace(one, text=text)
             ended.append(outcome)
             self.tell(progress.end(outcome))
             self._tell_output(outcome)
@@ -92,10 +89,3 @@ class Session:
         """The names of the checks that failed on any device."""
         wrong = (one.name for ended in self.outcomes.values() for one in ended if one.wrong)
         return list(dict.fromkeys(wrong))
-
-
-def _with_seed(setting: Setting, outcome: Outcome) -> Outcome:
-    """What failed in a repeat says with which seed it fails again."""
-    if not (outcome.wrong and outcome.repeat):
-        return outcome
-    return replace(outcome, text=f"--seed {setting.seed_of(outcome.repeat)}: {outcome.text}")

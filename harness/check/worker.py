@@ -32,7 +32,7 @@ STRIDE = 1_000_003
 class Setting:
     """What a worker needs to know: which device, which trackers, which seed."""
 
-    device: str | None
+    device: str | None = None
     """A selector, or None for the first."""
     driver: str = ""
     """What the process is to see; '' where that is to be found out."""

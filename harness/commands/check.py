@@ -6,6 +6,7 @@ import argparse
 import sys
 import time
 from argparse import Namespace
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +19,14 @@ if TYPE_CHECKING:
     from freepath.check.session import Session
     from freepath.selection import Parts
 
+FOR_CTEST = ("timeout", "arithmetic", "storage", "device", "trackers", "seed")
+FOR_DRIVERS = (
+    *("parallel", "timeout", "repeat", "arithmetic", "storage", "trackers", "seed"),
+    *("label_regex", "label_exclude", "tests_regex", "exclude_regex"),
+    *("verbose", "rerun_failed", "stop_on_failure", "output_on_failure"),
+)
+"""What the process of a driver is told again, beside its devices."""
+
 
 def add(commands: Any) -> None:
     """Declare its arguments."""
@@ -27,111 +36,71 @@ def add(commands: Any) -> None:
         description="Run checks with a known error budget on devices; flags and text are ctest's.",
         allow_abbrev=False,
     )
-    _add_selection(check)
-    _add_running(check)
+    add_argument = check.add_argument
+
+    def flag(*names: str, help: str) -> None:  # noqa: A002 (as argparse calls it)
+        add_argument(*names, action="store_true", help=help)
+
+    def labels(*names: str, help: str) -> None:  # noqa: A002
+        add_argument(*names, action="append", default=[], metavar="RE", help=help)
+
+    def given(name: str, kind: Any, metavar: str, help: str, default: Any = None) -> Any:  # noqa: A002
+        return add_argument(name, type=kind, metavar=metavar, default=default, help=help)
+
+    flag("-N", "--show-only", help="list the checks and stop")
+    flag("-V", "--verbose", help="say what each check guards against, and all that it says")
+    add_argument("-R", "--tests-regex", metavar="RE", help="only checks whose name matches")
+    add_argument("-E", "--exclude-regex", metavar="RE", help="no checks whose name matches")
+    labels("-L", "--label-regex", help="only checks with a label that matches; of several, all")
+    labels("-LE", "--label-exclude", help="no checks with a label that matches")
+    flag("--rerun-failed", help="those that failed last time")
+    add_argument(
+        "-j", "--parallel", type=_count, default=1, metavar="N", help="N processes (default: 1)"
+    )
+    text = "stop a check that takes longer (default: 300)"
+    given("--timeout", _seconds, "SECONDS", text, 300.0)
+    flag("--stop-on-failure", help="stop at the first that fails")
+    flag("--output-on-failure", help="what was measured where a check fails")
+    given("--output-junit", Path, "FILE", "write results as JUnit XML").complete = shtab.FILE
+    text = "run all N times with fresh seeds, and estimate the rate of false alarms"
+    given("--repeat", _count, "N", text, 1)
+    given("--seed", _seed, "N", "another seed than the usual")
+    for name, usual, other, of in (
+        ("arithmetic", "strict", "fast", "what kernels are built with"),
+        ("storage", "float", "half", "how voxels are stored"),
+    ):
+        text = f"{of} where a check does not say; {other}: see what that breaks"
+        add_argument(f"--{name}", choices=[usual, other], default=usual, help=text)
+    text = "write DIR/CTestTestfile.cmake, so that ctest runs these checks, and stop"
+    given("--ctest", Path, "DIR", text).complete = shtab.DIRECTORY
+    # given to the process of a driver: who started it shows them all
+    given("--outcomes", Path, "FILE", argparse.SUPPRESS)
     add_device(check, "part of the name, platform or driver of a device, or 'all'; may be repeated")
     add_trackers(check)
 
 
-def _add_selection(check: Any) -> None:
-    check.add_argument("-N", "--show-only", action="store_true", help="list the checks and stop")
-    check.add_argument(
-        "-V",
-        "--verbose",
-        action="store_true",
-        help="say what each check guards against, and all that it says",
-    )
-    check.add_argument("-R", "--tests-regex", metavar="RE", help="only checks whose name matches")
-    check.add_argument("-E", "--exclude-regex", metavar="RE", help="no checks whose name matches")
-    check.add_argument(
-        "-L",
-        "--label-regex",
-        action="append",
-        default=[],
-        metavar="RE",
-        help="only checks with a label that matches; given twice, both must",
-    )
-    check.add_argument(
-        "-LE",
-        "--label-exclude",
-        action="append",
-        default=[],
-        metavar="RE",
-        help="no checks with a label that matches",
-    )
-    check.add_argument("--rerun-failed", action="store_true", help="those that failed last time")
+def _number(kind: Callable[[str], Any], holds: Callable[[Any], bool], what: str) -> Any:
+    """A type of an argument: what `kind` reads of it, where that holds."""
+
+    def read(text: str) -> Any:
+        try:
+            value = kind(text)
+        except ValueError:
+            value = -1
+        if not holds(value):
+            raise argparse.ArgumentTypeError(f"expected {what}, got '{text}'")
+        return value
+
+    return read
 
 
-def _add_running(check: Any) -> None:
-    check.add_argument(
-        "-j", "--parallel", type=_count, default=1, metavar="N", help="so many processes"
-    )
-    check.add_argument(
-        "--timeout",
-        type=_seconds,
-        default=300.0,
-        metavar="SECONDS",
-        help="stop a check that takes longer (default: 300)",
-    )
-    check.add_argument(
-        "--stop-on-failure", action="store_true", help="stop at the first that fails"
-    )
-    check.add_argument(
-        "--output-on-failure", action="store_true", help="what was measured where a check fails"
-    )
-    check.add_argument(
-        "--output-junit", type=Path, metavar="FILE", help="write results as JUnit XML"
-    ).complete = shtab.FILE
-    check.add_argument(
-        "--repeat",
-        type=_count,
-        default=1,
-        metavar="N",
-        help="run all N times with fresh seeds, and estimate the rate of false alarms",
-    )
-    check.add_argument("--seed", type=_seed, metavar="N", help="another seed than the usual")
-    check.add_argument(
-        "--arithmetic",
-        choices=["strict", "fast"],
-        default="strict",
-        help="what kernels are built with where a check does not say; fast: see what it breaks",
-    )
-    check.add_argument(
-        "--storage",
-        choices=["float", "half"],
-        default="float",
-        help="how voxels are stored where a check does not say; half: see what that breaks",
-    )
-    check.add_argument(
-        "--ctest",
-        type=Path,
-        metavar="DIR",
-        help="write DIR/CTestTestfile.cmake, so that ctest runs these checks, and stop",
-    ).complete = shtab.DIRECTORY
-    # given to the process of a driver: who started it shows them all
-    check.add_argument("--outcomes", type=Path, help=argparse.SUPPRESS)
+def _whole(text: str) -> int:
+    return int(text) if text.isascii() and text.isdigit() else -1
 
 
-def _count(text: str) -> int:
-    if not text.isascii() or not text.isdigit() or not 1 <= int(text) <= 100_000:
-        raise argparse.ArgumentTypeError(f"expected an integer from 1 to 100000, got '{text}'")
-    return int(text)
-
-
-def _seed(text: str) -> int:
-    if not text.isascii() or not text.isdigit() or int(text) >= 2**53:
-        raise argparse.ArgumentTypeError(f"expected an integer from 0 to 2^53 - 1, got '{text}'")
-    return int(text)
-
-
-def _seconds(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = 0.0
-    if not 0.0 < value <= 1e6:
-        raise argparse.ArgumentTypeError(f"expected seconds above 0, at most 1e6, got '{text}'")
-    return value
+_count = _number(_whole, lambda n: 1 <= n <= 100_000, "an integer from 1 to 100000")
+_seed = _number(_whole, lambda n: 0 <= n < 2**53, "an integer from 0 to 2^53 - 1")
+_seconds = _number(float, lambda s: 0.0 < s <= 1e6, "seconds above 0, at most 1e6")
 
 
 def execute(options: Namespace) -> int:
@@ -144,8 +113,8 @@ def execute(options: Namespace) -> int:
         print(printing.listing(chosen, verbose=options.verbose))
         return 0
     if options.ctest:
-        path = files.write_ctest(options.ctest, chosen, _handed_on(options), options.timeout)
-        print(f"wrote {path}")
+        again = ["--output-on-failure", *_again(options, FOR_CTEST)]
+        print(f"wrote {files.write_ctest(options.ctest, chosen, again, options.timeout)}")
         return 0
     return _run(options, chosen)
 
@@ -166,15 +135,19 @@ def _chosen(options: Namespace) -> list[tuple[int, Check]]:
     return chosen
 
 
-def _handed_on(options: Namespace) -> list[str]:
-    """The arguments that ctest passes to each check."""
-    handed = ["--output-on-failure", "--timeout", f"{options.timeout:g}"]
-    handed += ["--arithmetic", options.arithmetic, "--storage", options.storage]
-    for device in options.device:
-        handed += ["-d", device]
-    for folder in options.trackers:
-        handed += ["--trackers", str(folder.resolve())]
-    return handed if options.seed is None else [*handed, "--seed", str(options.seed)]
+def _again(options: Namespace, names: tuple[str, ...]) -> list[str]:
+    """The arguments that say these options again, from whatever folder."""
+
+    def words() -> Iterator[str]:
+        for name in names:
+            value, flag = getattr(options, name), f"--{name.replace('_', '-')}"
+            for one in value if isinstance(value, list) else [value]:
+                if one is True:
+                    yield flag
+                elif one is not None and one is not False:
+                    yield from (flag, str(one.resolve() if isinstance(one, Path) else one))
+
+    return list(words())
 
 
 def _run(options: Namespace, chosen: list[tuple[int, Check]]) -> int:
@@ -184,22 +157,7 @@ def _run(options: Namespace, chosen: list[tuple[int, Check]]) -> int:
     parts = selection.resolve(options.device)
     here = selection.can_be_here(parts)
     infos = parts[0].infos if here else []
-    running = session.Session(
-        chosen,
-        session.Options(
-            processes=options.parallel,
-            timeout=options.timeout,
-            repeat=options.repeat,
-            seed=options.seed,
-            trackers=options.trackers,
-            arithmetic=options.arithmetic,
-            storage=options.storage,
-            stop_on_failure=options.stop_on_failure,
-            output_on_failure=options.output_on_failure,
-            verbose=options.verbose,
-        ),
-        _tell,
-    )
+    running = session.Session(chosen, session.Options.of(options), _tell)
     # a file that cannot be written is told before hours of checks, not after
     files.write_junit(options.output_junit, running.outcomes)
     unusable: list[str] = []
@@ -256,7 +214,8 @@ def _run_in_processes(options: Namespace, parts: Parts, running: Session) -> lis
     from freepath.check import everywhere
 
     unusable: list[str] = []
-    for outcomes, messages, code in everywhere.run(parts, _for_drivers(options), _tell):
+    again = _again(options, FOR_DRIVERS)
+    for outcomes, messages, code in everywhere.run(parts, again, _tell):
         running.outcomes |= outcomes
         unusable += messages
         if code == INTERRUPTED:
@@ -264,20 +223,6 @@ def _run_in_processes(options: Namespace, parts: Parts, running: Session) -> lis
         if options.stop_on_failure and (running.failed or unusable):
             break
     return unusable
-
-
-def _for_drivers(options: Namespace) -> list[str]:
-    """The arguments that the process of a driver gets, without its devices."""
-    arguments = ["-j", str(options.parallel), "--timeout", f"{options.timeout:g}"]
-    arguments += ["--repeat", str(options.repeat)]
-    arguments += ["--arithmetic", options.arithmetic, "--storage", options.storage]
-    lists = {"-L": options.label_regex, "-LE": options.label_exclude, "--trackers": []}
-    lists["--trackers"] = [str(folder.resolve()) for folder in options.trackers]
-    lists |= {"-R": [options.tests_regex], "-E": [options.exclude_regex], "--seed": [options.seed]}
-    for flag, values in lists.items():
-        arguments += [word for value in values if value is not None for word in (flag, str(value))]
-    flags = ("verbose", "rerun_failed", "stop_on_failure", "output_on_failure")
-    return arguments + [f"--{flag.replace('_', '-')}" for flag in flags if getattr(options, flag)]
 
 
 def _run_on(running: Session, info: Any) -> list[str]:

@@ -2,7 +2,6 @@
 
 import pytest
 from freepath.check.defects import DEFECTS, Defect, caught
-from freepath.check.planted_host import HOST
 from freepath.check.rig import Change
 
 from checks.support import CHECKS
@@ -28,6 +27,6 @@ def test_a_defect_without_its_place_is_an_error(rig):
     with pytest.raises(LookupError, match="nothing with a place"):
         caught(rig, Defect("none", "no such text", "", check.name), check)
     with pytest.raises(LookupError, match="nothing with a place"):
-        caught(rig, HOST[0], check)
+        caught(rig, next(one for one in DEFECTS if one.function), check)
     with pytest.raises(LookupError, match="places"):
         rig.with_change(Change("path", "")).flight(tracker="ratio", medium="gaussian", lanes=1)

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from freepath.catalog import Catalog
 from freepath.check.identities import check_clean, check_mean, check_variance
-from freepath.check.model import Check
 from freepath.check.rig import Rig
-from freepath.check.suite.channels import check_channels
+from freepath.check.suite.channels import check_any, check_channels
+from freepath.check.suite.common import Checks
 from freepath.check.suite.near_light import double
 from freepath.check.suite.scattering import CLOUD, FEW, POINT, follow, homogeneous, rod_model
 from freepath.check.verdict import demand
@@ -22,62 +20,18 @@ WEIGHTED = ("regular", "two_knob", "weighted_delta")
 FACTORS, ALBEDOS = [1.0, 0.6, 0.3], [0.9, 0.5, 0.3]
 LIMIT = 64
 """Scatterings; what is left of the light after so many with an albedo of a half is no number."""
-FURNACE = (
-    "Without absorption every path should go on; those that are absorbed all the same must be made "
-    "up for by the weights of the others, to the last."
-)
-ROD = (
-    "A survival that weights are not divided by, or an albedo that is left to both the chance and "
-    "the weight, or to neither, is another medium: the rod model knows what this one reflects."
-)
-SPREAD = (
-    "A mean does not tell how often paths are absorbed: the second moment of a weight is what "
-    "another rod gives, whose albedo is albedo^2 / (1 - P_absorb)."
-)
+ROD = """A survival that weights are not divided by, or an albedo that is left to both the chance
+and the weight, or to neither, is another medium: the rod model knows what this one reflects."""
+AGREE = """Beyond these there is no reference: a chance that is chosen is held against roulette and
+against paths that nothing ends, for every light, with lanes of one and of two modes."""
 TWICE = "Between two collisions a path survives once: an integral over both knows what is lost."
-AGREE = (
-    "Beyond these there is no reference: a chance that is chosen is held against roulette and "
-    "against paths that nothing ends, for every light, with lanes of one and of two modes."
-)
-
-
-def checks(catalog: Catalog) -> Iterator[Check]:
-    """Of the axis p_absorb."""
-    for tracker, chance in (("delta", 0.0), ("delta", 0.3), ("regular", 0.3), ("spectral", 0.3)):
-        yield _check(f"furnace/{chance}/{tracker}", tracker, FURNACE, furnace, chance=chance)
-    given = [("delta", albedo, chance) for albedo, chance in itertools.product((0.3, 0.9), CHOSEN)]
-    for tracker, albedo, chance in [*given, *((name, 0.9, 0.3) for name in WEIGHTED)]:
-        name = f"rod/albedo-{albedo}-{chance}/{tracker}"
-        yield _check(name, tracker, ROD, rod, albedo=albedo, chance=chance)
-    for chance in CHOSEN:
-        yield _check(f"variance/{chance}/delta", "delta", SPREAD, variance, chance=chance)
-    # P_absorb 0, P_scatter sigma_s / (sigma_s + |sigma_n|)
-    scatter = {"sampler": {"two_knob": {"acceptance": 0.9}}, "albedo": 0.9, "chance": 0.0}
-    yield _check("rod/albedo-0.9-no-absorption/two_knob", "two_knob", ROD, rod, **scatter)
-    for chance in CHOSEN:
-        yield _check(f"channels/{chance}/spectral", "spectral", ROD, channels, chance=chance)
-    options = {"sampler": "delta", "place": "outside", "g": 0.0, "p_absorb": 0.3}
-    yield _check("double/0.3/delta", "delta", TWICE, double, label="slow", **options)
-    for shadow, chance in itertools.product(("ratio", "regular"), (0.0, 0.3)):
-        name = f"several/{chance}-{shadow}/delta"
-        yield _check(name, "delta", AGREE, several, shadow=shadow, chance=chance)
-    for tracker in ("delta", "spectral"):
-        yield _check(f"unlimited/{tracker}", tracker, AGREE, unlimited)
-
-
-def _check(
-    name: str, tracker: str, sentence: str, situation: Any, label: str = "fast", **options: Any
-) -> Check:
-    def run(rig: Rig, alpha: float) -> None:
-        situation(rig, alpha, tracker=tracker, **options)
-
-    labels = (label, "hard", "scattering", "p_absorb", tracker)
-    kernels = f"p_absorb/{name.split('/', maxsplit=1)[0]}/{tracker}"
-    return Check(f"hard/p_absorb/{name}", labels, sentence, run, kernels=kernels)
+checks = Checks()
 
 
 def furnace(rig: Rig, alpha: float, tracker: str, chance: float) -> None:
-    """Weights grow as much as paths get fewer; with a chance of 0 all bring the same."""
+    """Without absorption every path should go on; those that are absorbed all the same must be made
+    up for by the weights of the others, to the last."""
+    # Weights grow as much as paths get fewer; with a chance of 0 all bring the same.
     coloured = {"channels": FACTORS} if tracker == "spectral" else {}
     medium = {"cloud": CLOUD | {"sigma_t": 2, "albedo": 1, "g": 0.4} | coloured}
     one = follow(rig, tracker, medium, majorant="grid", rays=FEW, p_absorb=chance).run(8192)
@@ -109,7 +63,9 @@ def rod(
 
 
 def variance(rig: Rig, alpha: float, tracker: str, chance: float | str) -> None:
-    """Of paths that bring their weight where they leave."""
+    """A mean does not tell how often paths are absorbed: the second moment of a weight is what
+    another rod gives, whose albedo is albedo^2 / (1 - P_absorb)."""
+    # Of paths that bring their weight where they leave.
     # at 0.9 fourth powers of weights grow too fast for a test of a variance
     albedo, depth = 0.8, 1.0
     survival = albedo if chance == "analog" else 1.0 - chance
@@ -154,7 +110,34 @@ def unlimited(rig: Rig, alpha: float, tracker: str) -> None:
 
 def _agree(one: Moments, other: Moments, alpha: float) -> None:
     joint = Moments(one.count, one.mean, one.m2 + other.m2)
-    if one.mean.ndim == 1:
-        check_mean(joint, other.mean, alpha)
-    else:
-        check_channels(joint, other.mean, alpha)
+    check_any(joint, other.mean, alpha)
+
+
+def _declare() -> None:
+    for tracker, chance in (("delta", 0.0), ("delta", 0.3), ("regular", 0.3), ("spectral", 0.3)):
+        _one(f"furnace/{chance}", tracker, furnace, chance=chance)
+    given = [("delta", albedo, chance) for albedo, chance in itertools.product((0.3, 0.9), CHOSEN)]
+    for tracker, albedo, chance in [*given, *((name, 0.9, 0.3) for name in WEIGHTED)]:
+        keys = {"albedo": albedo, "chance": chance, "sentence": ROD}
+        _one(f"rod/albedo-{albedo}-{chance}", tracker, rod, **keys)
+    # P_absorb 0, P_scatter sigma_s / (sigma_s + |sigma_n|)
+    scatter = {"sampler": {"two_knob": {"acceptance": 0.9}}, "albedo": 0.9, "chance": 0.0}
+    _one("rod/albedo-0.9-no-absorption", "two_knob", rod, sentence=ROD, **scatter)
+    for chance in CHOSEN:
+        _one(f"variance/{chance}", "delta", variance, chance=chance)
+        _one(f"channels/{chance}", "spectral", channels, chance=chance, sentence=ROD)
+    options = {"sampler": "delta", "place": "outside", "g": 0.0, "p_absorb": 0.3}
+    _one("double/0.3", "delta", double, "slow", sentence=TWICE, **options)
+    for shadow, chance in itertools.product(("ratio", "regular"), (0.0, 0.3)):
+        keys = {"shadow": shadow, "chance": chance, "sentence": AGREE}
+        _one(f"several/{chance}-{shadow}", "delta", several, **keys)
+    for tracker in ("delta", "spectral"):
+        _one("unlimited", tracker, unlimited, sentence=AGREE)
+
+
+def _one(name: str, tracker: str, situation: Any, speed: str = "fast", **options: Any) -> None:
+    labels = (speed, "scattering")
+    checks.one(f"p_absorb/{name}/{tracker}", tracker, labels=labels, **options)(situation)
+
+
+_declare()

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from freepath.catalog import Catalog
 from freepath.check.identities import (
     check_clean,
     check_count,
@@ -16,8 +14,8 @@ from freepath.check.identities import (
     check_variance,
     check_weighted_free_path,
 )
-from freepath.check.model import Check
 from freepath.check.rig import Flight, Rig
+from freepath.check.suite.common import Checks
 from freepath.check.truth import depth_at
 from freepath.check.verdict import demand
 from freepath.stats import Moments
@@ -34,64 +32,7 @@ MEDIA = {
 }
 MAJORANTS = {"grid": "grid", "octree": {"octree": {"resolution": 8}}}
 UNEQUAL = {"1-1000": (1.0, 1e-3), "of-nothing": (1.0, 0.03, 1e-3, 0.0)}
-SENTENCES = {
-    "mean": "One path serves all channels: a weight that is another channel's, or not divided by "
-    "the probability of what happened, biases some of them and leaves the first right.",
-    "local": "Majorants of a cell are those of the densest channel; another one's is violated.",
-    "free-path": "The path ends where one channel would; in each its weighted ends must be spread "
-    "as that channel's free paths are.",
-    "variance": "Another probability than the one named keeps the mean and changes variance and "
-    "cost: both follow from a chain of weights.",
-    "one": "With one channel every probability is delta tracking, sample for sample.",
-    "bounded": "Without their history, weights of thin channels multiply without end; their "
-    "average, which history keeps at 1, bounds them by the number of channels.",
-    "unequal": "A channel of a thousandth, or of nothing, has its mean where others end the path.",
-    "albedo": "Albedos that are swapped, or the first for all, change colours alone: each channel "
-    "must have its own, and an albedo of 0 no light at all.",
-}
-
-
-def checks(catalog: Catalog) -> Iterator[Check]:
-    """The group channels."""
-    yield from _single()
-    for probability, medium, tightness in itertools.product(PROBABILITIES, MEDIA, (1.0, 2.0, 0.8)):
-        axes = {"medium": MEDIA[medium], "tightness": tightness}
-        name = f"mean/{medium}-{tightness}/{probability}"
-        yield _check(name, mean, medium, probability=probability, axes=axes)
-    for probability, tightness in itertools.product(PROBABILITIES, (1.25, 2.0, 0.8)):
-        name, options = f"variance/{tightness}/{probability}", {"tightness": tightness}
-        yield _check(name, variance, "homogeneous", probability=probability, **options)
-    for tracker, majorant in itertools.product(("spectral", "spectral_ratio"), MAJORANTS):
-        options = {"tracker": tracker, "majorant": MAJORANTS[majorant]}
-        yield _check(f"local/{majorant}/{tracker}", local, majorant, **options)
-
-
-def _single() -> Iterator[Check]:
-    for probability in PROBABILITIES:
-        given = {"probability": probability}
-        yield _check(f"free-path/{probability}", free_path, "free-path", **given)
-        for estimand in ("transmittance", "free_path"):
-            yield _check(f"one/{estimand}/{probability}", one, "one", estimand=estimand, **given)
-    for name, factors in UNEQUAL.items():
-        yield _check(f"bounded/{name}", bounded, "free-path", factors=factors)
-        for tracker in ("spectral", "spectral_ratio"):
-            options = {"factors": factors, "tracker": tracker}
-            yield _check(f"unequal/{name}/{tracker}", unequal, "homogeneous", **options)
-    for probability in ("history_average", "average"):
-        yield _check(f"albedo/{probability}", albedo, "albedo", probability=probability)
-    yield _check("variance/spectral_ratio", ratio_variance, "homogeneous")
-
-
-def _check(name: str, situation: Any, kernels: str, **options: Any) -> Check:
-    def run(rig: Rig, alpha: float) -> None:
-        situation(rig, alpha, **options)
-
-    kind, tracker = name.split("/", maxsplit=1)[0], "spectral"
-    if name.endswith("spectral_ratio"):
-        tracker = "spectral_ratio"
-    shared = f"{GROUP}/{kernels}/{options.get('probability', tracker)}"
-    labels = ("fast", "hard", GROUP, tracker)
-    return Check(f"hard/{GROUP}/{name}", labels, SENTENCES[kind], run, kernels=shared)
+checks = Checks()
 
 
 def _fly(rig: Rig, probability: str, **axes: Any) -> Flight:
@@ -106,8 +47,14 @@ def check_channels(moments: Moments, expected: np.ndarray, alpha: float) -> None
         check_mean(one, wanted, alpha / expected.shape[1])
 
 
+def check_any(moments: Moments, expected: np.ndarray, alpha: float) -> None:
+    """The mean of one channel or of each."""
+    (check_mean if moments.mean.ndim == 1 else check_channels)(moments, expected, alpha)
+
+
 def mean(rig: Rig, alpha: float, probability: str, axes: dict[str, Any]) -> None:
-    """Unbiased in every channel."""
+    """One path serves all channels: a weight that is another channel's, or not divided by the
+    probability of what happened, biases some of them and leaves the first right."""
     flight = _fly(rig, probability, **axes)
     found = flight.record(SAMPLES).round
     check_clean(found, bounded=axes["tightness"] >= 1)
@@ -115,7 +62,7 @@ def mean(rig: Rig, alpha: float, probability: str, axes: dict[str, Any]) -> None
 
 
 def local(rig: Rig, alpha: float, tracker: str, majorant: Any) -> None:
-    """Majorants of cells."""
+    """Majorants of a cell are those of the densest channel; another one's is violated."""
     flight = rig.flight(tracker=tracker, medium=MEDIA["trilinear"], majorant=majorant, lanes=1)
     found = flight.record(SAMPLES).round
     check_clean(found, bounded=True)
@@ -123,7 +70,8 @@ def local(rig: Rig, alpha: float, tracker: str, majorant: Any) -> None:
 
 
 def free_path(rig: Rig, alpha: float, probability: str) -> None:
-    """Weighted free paths of every channel."""
+    """The path ends where one channel would; in each its weighted ends must be spread as that
+    channel's free paths are."""
     axes = {"medium": MEDIA["exponential"], "estimand": "free_path", "tightness": 1.5}
     flight = _fly(rig, probability, **axes)
     samples = flight.record(SAMPLES)
@@ -166,7 +114,9 @@ class Chain:
 
 
 def variance(rig: Rig, alpha: float, probability: str, tightness: float) -> None:
-    """Variances and lookups of the chain."""
+    """Another probability than the one named keeps the mean and changes variance and cost: both
+    follow from a chain of weights."""
+    # Variances and lookups of the chain.
     flight = _fly(rig, probability, medium=MEDIA["homogeneous"], tightness=tightness)
     majorant = 1.5 * tightness
     chain = Chain(probability, 1.5 * np.array(CHANNELS), majorant)
@@ -191,7 +141,8 @@ def ratio_variance(rig: Rig, alpha: float) -> None:
 
 
 def one(rig: Rig, alpha: float, probability: str, estimand: str) -> None:
-    """Delta tracking, sample for sample."""
+    """With one channel every probability is delta tracking, sample for sample."""
+    # Delta tracking, sample for sample.
     axes = {"estimand": estimand, "majorant": "grid", "tightness": 1.5, "medium": "trilinear"}
     first = _fly(rig, probability, **axes).record(256)
     other = rig.flight(tracker="delta", lanes=16, **axes).record(256)
@@ -200,7 +151,8 @@ def one(rig: Rig, alpha: float, probability: str, estimand: str) -> None:
 
 
 def bounded(rig: Rig, alpha: float, factors: tuple[float, ...]) -> None:
-    """With history the average of the weights stays 1; without it they exceed any bound."""
+    """Without their history, weights of thin channels multiply without end; their average, which
+    history keeps at 1, bounds them by the number of channels."""
     medium = {"homogeneous": {"sigma_t": 3, "channels": factors}}
     kept, other = (
         _fly(rig, probability, medium=medium, estimand="free_path").record(2048).weights
@@ -214,7 +166,7 @@ def bounded(rig: Rig, alpha: float, factors: tuple[float, ...]) -> None:
 
 
 def unequal(rig: Rig, alpha: float, tracker: str, factors: tuple[float, ...]) -> None:
-    """Channels of a thousandth and of nothing."""
+    """A channel of a thousandth, or of nothing, has its mean where others end the path."""
     medium = {"homogeneous": {"sigma_t": 3, "channels": factors}}
     flight = rig.flight(tracker=tracker, medium=medium, lanes=16)
     found, expected = flight.record(SAMPLES).round, flight.reference()
@@ -223,7 +175,9 @@ def unequal(rig: Rig, alpha: float, tracker: str, factors: tuple[float, ...]) ->
 
 
 def albedo(rig: Rig, alpha: float, probability: str) -> None:
-    """Single scattering of three channels, with an albedo of 1, a half and 0."""
+    """Albedos that are swapped, or the first for all, change colours alone: each channel must have
+    its own, and an albedo of 0 no light at all."""
+    # Single scattering of three channels, with an albedo of 1, a half and 0.
     keys = {"channels": [1, 0.6, 0.3], "albedo": [1.0, 0.5, 0.0]}
     light = {"point": {"position": [0.3, 0.4, 2.0], "intensity": [10, 5, 5]}}
     axes = {"light": light, "scatterings": 1, "shadow": "spectral_ratio", "estimand": "radiance"}
@@ -234,3 +188,40 @@ def albedo(rig: Rig, alpha: float, probability: str) -> None:
     demand(not found.moments.mean[:, 2].any(), "a channel without albedo scatters")
     colours = Moments(found.moments.count, found.moments.mean[:, :2], found.moments.m2[:, :2])
     check_channels(colours, flight.reference()[:, :2], alpha)
+
+
+def _declare() -> None:
+    for probability, tightness in itertools.product(PROBABILITIES, (1.0, 2.0, 0.8)):
+        for medium, given in MEDIA.items():
+            axes = {"medium": given, "tightness": tightness}
+            name = f"mean/{medium}-{tightness}/{probability}"
+            _one(name, mean, medium, probability=probability, axes=axes)
+    for probability, tightness in itertools.product(PROBABILITIES, (1.25, 2.0, 0.8)):
+        name, options = f"variance/{tightness}/{probability}", {"tightness": tightness}
+        _one(name, variance, "homogeneous", probability=probability, **options)
+    for tracker, majorant in itertools.product(("spectral", "spectral_ratio"), MAJORANTS):
+        options = {"tracker": tracker, "majorant": MAJORANTS[majorant]}
+        _one(f"local/{majorant}/{tracker}", local, majorant, **options)
+    for probability in PROBABILITIES:
+        given = {"probability": probability}
+        _one(f"free-path/{probability}", free_path, "free-path", **given)
+        for estimand in ("transmittance", "free_path"):
+            _one(f"one/{estimand}/{probability}", one, "one", estimand=estimand, **given)
+    for name, factors in UNEQUAL.items():
+        _one(f"bounded/{name}", bounded, "free-path", factors=factors)
+        for tracker in ("spectral", "spectral_ratio"):
+            options = {"factors": factors, "tracker": tracker}
+            _one(f"unequal/{name}/{tracker}", unequal, "homogeneous", **options)
+    for probability in ("history_average", "average"):
+        _one(f"albedo/{probability}", albedo, "albedo", probability=probability)
+    _one("variance/spectral_ratio", ratio_variance, "homogeneous", sentence=variance.__doc__)
+
+
+def _one(name: str, situation: Any, kernels: str, **options: Any) -> None:
+    tracker = "spectral_ratio" if name.endswith("spectral_ratio") else "spectral"
+    shared = f"{GROUP}/{kernels}/{options.get('probability', tracker)}"
+    options.pop("tracker", None)
+    checks.one(f"{GROUP}/{name}", tracker, kernels=shared, **options)(situation)
+
+
+_declare()

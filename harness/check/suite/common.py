@@ -2,44 +2,79 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
 from freepath.catalog import Catalog, Tracker
-from freepath.check.model import Check, always, majorant_of, of_tracker
+from freepath.check.model import Check, majorant_of
 from freepath.check.rig import Flight, Rig
 
 FEW = {"chords": {"count": 16}}
 UPWARD = {"orthographic": {"resolution": [4, 4]}}
 GRID = {"grid": {"resolution": 4}}
-CELLS = 8
-# A unit cube of which about half of the voxels are empty.
+COUNTS = (12, 4, 8)
+# A unit cube [z, y, x] of which about half of the voxels are empty. The counts differ, and so do
+# the sizes of a voxel: a stride or size of another axis shows. Faces are at each quarter of it.
 _RANDOM = np.random.default_rng(4)
-VOXELS = 4.0 * _RANDOM.random((CELLS,) * 3) * (_RANDOM.random((CELLS,) * 3) > 0.5)
+VOXELS = 4.0 * _RANDOM.random(COUNTS) * (_RANDOM.random(COUNTS) > 0.5)
 
 Wanted = Callable[[Tracker], bool]
+Labels = tuple[str, ...]
+Declare = Callable[[Any], Any]
 
 
-def hard(
-    catalog: Catalog, situation: tuple[str, str, Any], wanted: Wanted, sentence: str, **options: Any
-) -> Iterator[Check]:
-    """A check of each tracker that a situation (group, name, function) applies to.
+class Checks:
+    """The checks of a module, declared by decorating the functions that make them.
 
-    `options` may have `speed`, `applies` and what the function is to be called with beside.
+    The docstring of such a function is the sentence of its checks, if they are given no other.
+    Beside `sentence`, `applies` and `kernels`, `options` are what the function is called with.
     """
-    group, name, function = situation
-    speed, applies = options.pop("speed", "fast"), options.pop("applies", always)
-    for tracker in catalog.trackers.values():
-        if wanted(tracker):
-            yield Check(
-                f"hard/{group}/{name}/{tracker.name}",
-                (speed, "hard", group, tracker.name),
-                sentence,
-                of_tracker(tracker, function, **options),
-                applies,
-                tracker.name,
-            )
+
+    def __init__(self) -> None:
+        self._makers: list[Callable[[Catalog], Iterator[Check]]] = []
+
+    def __call__(self, catalog: Catalog) -> Iterator[Check]:
+        for make in self._makers:
+            yield from make(catalog)
+
+    def each(self, name: str, wanted: Wanted, labels: Labels, /, **options: Any) -> Declare:
+        """A check of each tracker that is wanted: function(rig, alpha, tracker, **options)."""
+
+        def declare(function: Any) -> Any:
+            def make(catalog: Catalog) -> Iterator[Check]:
+                for tracker in filter(wanted, catalog.trackers.values()):
+                    own = {"kernels": tracker.name, "tracker": tracker} | options
+                    full = f"{name}/{tracker.name}"
+                    yield Check.of(full, (*labels, tracker.name), function, **own)
+
+            self._makers.append(make)
+            return function
+
+        return declare
+
+    def hard(self, name: str, wanted: Wanted, /, speed: str = "fast", **options: Any) -> Declare:
+        """The same of a hard case, whose name begins with its group."""
+        group = name.split("/", maxsplit=1)[0]
+        return self.each(f"hard/{name}", wanted, (speed, "hard", group), **options)
+
+    def one(
+        self, name: str, tracker: str = "", /, *, labels: Labels = ("fast",), **options: Any
+    ) -> Declare:
+        """One hard check, of a tracker by name or of none: function(rig, alpha, **options)."""
+        group, kind = name.split("/")[:2]
+
+        def declare(function: Any) -> Any:
+            own = {"kernels": f"{group}/{kind}/{tracker}"} | options
+            if tracker and "tracker" in inspect.signature(function).parameters:
+                own["tracker"] = tracker
+            found = (labels[0], "hard", group, *labels[1:], *filter(None, [tracker]))
+            made = Check.of(f"hard/{name}", found, function, **own)
+            self._makers.append(lambda catalog: iter([made]))
+            return function
+
+        return declare
 
 
 def everyone(tracker: Tracker) -> bool:
@@ -102,7 +137,7 @@ def voxels(
         inner = [length * i / count for i in range(1, count)]
         layers = {"breakpoints": inner, "values": column, "size": [length] * 3}
         return fly(rig, tracker, {"layered": layers}, length, **axes)
-    size = length / len(values)
+    size = [length / count for count in values.shape[::-1]]
     medium = rig.volume(values, voxel_size=size, sigma_t=1.0 / length, interpolation=interpolation)
     return fly(rig, tracker, medium, length, **axes)
 

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 
-from freepath.catalog import Catalog, Tracker
-from freepath.check.model import Check, of_tracker
+from freepath.catalog import Tracker
 from freepath.check.rig import Rig
-from freepath.check.suite.common import VOXELS, everyone, voxels
+from freepath.check.suite.common import VOXELS, Checks, everyone, voxels
 from freepath.check.verdict import NotApplicable, demand
 
 COMMENT = re.compile(r"/\*.*?\*/|//[^\n]*", re.S)
@@ -17,22 +15,13 @@ EXACT = frozenset(("closed_form", "cells"))
 """What gives optical depths without a lookup."""
 
 
-def checks(catalog: Catalog) -> Iterator[Check]:
-    """One of every tracker that flies."""
-    for tracker in catalog.trackers.values():
-        if everyone(tracker):
-            yield Check(
-                f"lookups/counted/{tracker.name}",
-                ("fast", "moments", tracker.name),
-                "What is read past the count of lookups makes a tracker look cheaper than it is: "
-                "every one goes through sigma_t or sigma_t_at_tentative, which count.",
-                of_tracker(tracker, counted),
-                kernels=tracker.name,
-            )
+checks = Checks()
 
 
+@checks.each("lookups/counted", everyone, ("fast", "moments"))
 def counted(rig: Rig, alpha: float, tracker: Tracker) -> None:
-    """None past the count, and some where the medium varies and there is no other way."""
+    """What is read past the count of lookups makes a tracker look cheaper than it is: every one
+    goes through sigma_t or sigma_t_at_tentative, which count."""
     for number, line in enumerate(COMMENT.sub(_blank, tracker.code).splitlines(), 1):
         found = UNCOUNTED.search(line)
         demand(

@@ -51,7 +51,7 @@ class AlongRays:
 
 
 def binary(along: AlongRays) -> Expected:
-    """Delta tracking: 0 or 1."""
+    """Delta tracking, of the residual where there is a control: 0 or 1."""
     rate = np.full_like(along.sigma, along.majorant)
     return along.transmittance, along.until(rate, along.sigma)
 
@@ -82,12 +82,6 @@ def residual_ratio(along: AlongRays) -> Expected:
     return second, along.integral(0 * along.sigma + along.majorant)
 
 
-def decomposition(along: AlongRays) -> Expected:
-    """Delta tracking of the residual."""
-    rate = np.full_like(along.sigma, along.majorant)
-    return along.transmittance, along.until(rate, along.sigma)
-
-
 def weighted_decomposition(along: AlongRays) -> Expected:
     """With weights of either sign."""
     residual = along.sigma - along.control
@@ -105,11 +99,6 @@ def track_length_cost(along: AlongRays) -> Expected:
     return None, 2.0 * along.until(rate, along.sigma) + along.transmittance
 
 
-def binary_cost(along: AlongRays) -> Expected:
-    """Lookups as those of delta tracking; no formula of the variance."""
-    return None, binary(along)[1]
-
-
-def ratio_cost(along: AlongRays) -> Expected:
-    """Lookups as those of ratio tracking; no formula of the variance."""
-    return None, ratio(along)[1]
+def cost_of(known: Callable[[AlongRays], Expected]) -> Callable[[AlongRays], Expected]:
+    """Lookups as those of another; no formula of the variance."""
+    return lambda along: (None, known(along)[1])

@@ -3,24 +3,14 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from freepath.catalog import Catalog, Tracker
+from freepath.catalog import Tracker
 from freepath.check.cases import check_samples
 from freepath.check.identities import check_clean
-from freepath.check.model import Check
 from freepath.check.rig import Rig
-from freepath.check.suite.common import (
-    UPWARD,
-    VOXELS,
-    everyone,
-    hard,
-    knows_depth,
-    unit,
-    voxels,
-)
+from freepath.check.suite.common import UPWARD, VOXELS, Checks, everyone, knows_depth, unit, voxels
 from freepath.check.suite.thickness import WITHIN_1
 from freepath.check.truth import MajorantAlongRays
 from freepath.check.verdict import demand, require
@@ -77,58 +67,13 @@ def without_length() -> Lines:
 LINES = {kind: (np.array(a, float), unit(b)) for kind, (a, b) in lines_of_all_kinds().items()}
 
 
-def checks(catalog: Catalog) -> Iterator[Check]:
-    """The groups geometry, scale and contrast."""
-    for kind in LINES:
-        yield from hard(
-            catalog,
-            ("geometry", kind, special),
-            everyone,
-            "A ray along an axis divides by 0; on a face, edge or corner planes tie, and a walk "
-            "stalls, skips a cell, or leaves the box by rounding.",
-            kind=kind,
-        )
-    yield from hard(
-        catalog,
-        ("geometry", "no-length", no_length),
-        everyone,
-        "A ray that misses, is tangent or starts where it leaves has no length: it escapes with "
-        "the weight 1, and nothing is divided by its length.",
-    )
-    yield from hard(
-        catalog,
-        ("geometry", "crossings", crossings),
-        lambda t: t.name == "ratio",
-        "A walk that stalls crosses a plane twice, one that skips does not: the number of planes "
-        "is known.",
-    )
-    for name, length in UNITS.items():
-        yield from hard(
-            catalog,
-            ("scale", name, scaled),
-            everyone,
-            "The same scene in other units has the same transmittance, unless an epsilon has a "
-            "unit, or powers of lengths leave the range of a float.",
-            length=length,
-        )
-    yield from hard(
-        catalog,
-        ("scale", "from-afar", from_afar),
-        everyone,
-        "A ray from a million units away cancels in p - box if that is left to float32: it must "
-        "enter where it does, to the stated bound.",
-    )
-    yield from hard(
-        catalog,
-        ("contrast", "million", contrast),
-        everyone,
-        "Between neighbours of 0 and 10^6 interpolation and majorants overflow their neighbours, "
-        "and a denormal density is flushed or divided by.",
-    )
+checks = Checks()
 
 
 def special(rig: Rig, alpha: float, tracker: Tracker, kind: str) -> None:
-    """Ray by ray: one that goes wrong must not hide among others."""
+    """A ray along an axis divides by 0; on a face, edge or corner planes tie, and a walk stalls,
+    skips a cell, or leaves the box by rounding."""
+    # Ray by ray: one that goes wrong must not hide among others.
     lines = LINES[kind]
     repeated = tuple(np.tile(array, (4, 1)) for array in lines)
     flight = voxels(rig, tracker, VOXELS, lines=repeated)
@@ -148,8 +93,10 @@ def each_ray(moments: Moments, expected: np.ndarray, alpha: float) -> None:
     require(p_values, alpha, "mean of a ray", moments.mean, expected)
 
 
+@checks.hard("geometry/no-length", everyone)
 def no_length(rig: Rig, alpha: float, tracker: Tracker) -> None:
-    """Nothing happens."""
+    """A ray that misses, is tangent or starts where it leaves has no length: it escapes with the
+    weight 1, and nothing is divided by its length."""
     flight = voxels(rig, tracker, VOXELS, lines=without_length())
     demand((flight.segments[:, 6] == 0.0).all(), "a ray that should have no length has one")
     samples = flight.record(16)
@@ -159,8 +106,11 @@ def no_length(rig: Rig, alpha: float, tracker: Tracker) -> None:
     demand(worst == 0.0, f"scores differ from {expected} by {worst:.3g}")
 
 
+@checks.hard("geometry/crossings", lambda t: t.name == "ratio")
 def crossings(rig: Rig, alpha: float, tracker: Tracker) -> None:
-    """As many as there are planes, but for ties that rounding decides."""
+    """A walk that stalls crosses a plane twice, one that skips does not: the number of planes is
+    known."""
+    # As many as there are planes, but for ties that rounding decides.
     flight = voxels(rig, tracker, VOXELS, rays={"chords": {"count": 512}}, seed=rig.seed + 5)
     along = MajorantAlongRays(flight.case.majorant, flight.medium, 1.0, flight.segments)
     found = flight.run(1).counters["crossings"]
@@ -174,7 +124,8 @@ def crossings(rig: Rig, alpha: float, tracker: Tracker) -> None:
 
 
 def scaled(rig: Rig, alpha: float, tracker: Tracker, length: float) -> None:
-    """In other units."""
+    """The same scene in other units has the same transmittance, unless an epsilon has a unit, or
+    powers of lengths leave the range of a float."""
     origins, directions = LINES["axis"]
     flight = voxels(rig, tracker, VOXELS, length, lines=(origins * length, directions))
     check_samples(flight, flight.record(2048), alpha)
@@ -184,8 +135,11 @@ def scaled(rig: Rig, alpha: float, tracker: Tracker, length: float) -> None:
     demand(error < 1e-6, f"the reference differs by {error:.3g} between units")
 
 
+@checks.hard("scale/from-afar", everyone)
 def from_afar(rig: Rig, alpha: float, tracker: Tracker) -> None:
-    """A million away, towards the cube: as from beside it, to 1e-9 of a million."""
+    """A ray from a million units away cancels in p - box if that is left to float32: it must enter
+    where it does, to the stated bound."""
+    # A million away, towards the cube: as from beside it, to 1e-9 of a million.
     random = np.random.default_rng(12)
     targets = 0.2 + 0.6 * random.random((64, 3))
     directions = unit(random.normal(size=(64, 3)))
@@ -198,14 +152,13 @@ def from_afar(rig: Rig, alpha: float, tracker: Tracker) -> None:
     demand(error < 1e-2 * 2.0**-10, f"the same ray from afar is off by {error:.3g}")
 
 
+@checks.hard("contrast/million", everyone)
 def contrast(
-    rig: Rig,
-    alpha: float,
-    tracker: Tracker,
-    ends: tuple[float, float] = (1e6, 1e-42),
-    **axes: Any,
+    rig: Rig, alpha: float, tracker: Tracker, ends: tuple[float, float] = (1e6, 1e-42), **axes: Any
 ) -> None:
-    """Through a voxel of 10^6, one of a denormal density, and past both; or of other `ends`."""
+    """Between neighbours of 0 and 10^6 interpolation and majorants overflow their neighbours, and a
+    denormal density is flushed or divided by."""
+    # Through a voxel of 10^6, one of a denormal density, and past both; or of other `ends`.
     count = 4
     values = np.zeros((count,) * 3)
     values[1, 1::2, 2], values[2, 1, :], values[3, 3, :] = *ends, 1.0
@@ -229,3 +182,9 @@ def contrast(
     demand(worst < 1e-6 or tracker.name not in WITHIN_1, f"{worst:.3g} comes through {ends[0]:g}")
     lost = np.abs(samples.score[clear] - 1.0).max(initial=0.0)
     demand(lost < 1e-3, f"{lost:.3g} is lost beside it")
+
+
+for kind in LINES:
+    checks.hard(f"geometry/{kind}", everyone, kind=kind)(special)
+for name, length in UNITS.items():
+    checks.hard(f"scale/{name}", everyone, length=length)(scaled)

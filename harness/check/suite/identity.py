@@ -23,34 +23,22 @@ DRAW_FIRST = ("analytic", "regular")
 IN_DOUBLE = ("gaussian", "cosine", "trilinear")
 """Media without boundaries, which the kernel reads in single precision whatever its arithmetic."""
 PATHS = 256
-MEAN = (
-    "A wrong probability, weight, majorant or walk biases the mean: it must agree with float64 for "
-    "thin and for thick rays, and samples must neither share random numbers nor lose their end."
-)
-DISTRIBUTION = (
-    "Free paths could have the right mean and the wrong distribution: their optical depths must "
-    "pass chi-square and Kolmogorov-Smirnov tests, weighted where the tracker's are."
-)
-INVERSION = (
-    "An inversion that stops too early or loses digits shifts single paths by too little to be seen"
-    " in a mean: each must end where the optical depth is reached that was drawn for it."
-)
 
 
 def checks(catalog: Catalog) -> Iterator[Check]:
     """Means of all trackers, distributions of unbiased ones, inversions of those that draw one."""
     for tracker in catalog.trackers.values():
         for axes in cases_of(tracker):
-            yield _check(axes, "identity", MEAN, mean)
+            yield _check(axes, "identity", mean)
             if axes["estimand"] != "free_path":
                 continue
             if tracker.unbiased and tracker.name not in SCORES_ON_ITS_WAY:
-                yield _check(axes, "distribution", DISTRIBUTION, distribution)
+                yield _check(axes, "distribution", distribution)
             if tracker.name in DRAW_FIRST:
-                yield _check(axes, "inversion", INVERSION, inversion)
+                yield _check(axes, "inversion", inversion)
                 if axes["medium"] in IN_DOUBLE:
                     double = axes | {"arithmetic": "double", "lanes": 4}
-                    yield _check(double, "inversion-double", INVERSION, inversion)
+                    yield _check(double, "inversion-double", inversion)
 
 
 SCORES_ON_ITS_WAY = ("split",)
@@ -82,32 +70,32 @@ def name_of(axes: Axes) -> str:
     return "/".join(axes[axis] for axis in ("tracker", "estimand", "medium", "majorant"))
 
 
-def _check(axes: Axes, kind: str, sentence: str, situation: Any) -> Check:
-    def run(rig: Rig, alpha: float) -> None:
-        situation(rig, alpha, axes | {"majorant": WALKS[axes["majorant"]]})
-
-    name = name_of(axes)
-    double = "arithmetic" in axes
+def _check(axes: Axes, kind: str, function: Any) -> Check:
+    name, double = name_of(axes), "arithmetic" in axes
     speed = "fast" if axes["medium"] in FAST and not double else "slow"
-    label = "identity" if kind == "identity" else "distribution"
+    labels = (speed, "identity" if kind == "identity" else "distribution", axes["tracker"])
     options = {"applies": needs_double} if double else {}
-    labels = (speed, label, axes["tracker"])
-    return Check(f"{kind}/{name}", labels, sentence, run, kernels=name, **options)
+    options["axes"] = axes | {"majorant": WALKS[axes["majorant"]]}
+    return Check.of(f"{kind}/{name}", labels, function, kernels=name, **options)
 
 
 def mean(rig: Rig, alpha: float, axes: Axes) -> None:
-    """All that must hold for samples of any tracker."""
+    """A wrong probability, weight, majorant or walk biases the mean: it must agree with float64 for
+    thin and for thick rays, and samples must neither share random numbers nor lose their end."""
     cases.check_case(rig, axes, alpha)
 
 
 def distribution(rig: Rig, alpha: float, axes: Axes) -> None:
-    """With looser majorants, another seed and more samples."""
+    """Free paths could have the right mean and the wrong distribution: their optical depths must
+    pass chi-square and Kolmogorov-Smirnov tests, weighted where the tracker's are."""
+    # With looser majorants, another seed and more samples.
     flight = rig.flight(**axes | {"tightness": 3}, seed=rig.seed + 77)
     cases.check_distribution(flight, flight.record(512), alpha)
 
 
 def inversion(rig: Rig, alpha: float, axes: Axes) -> None:
-    """Path by path."""
+    """An inversion that stops too early or loses digits shifts single paths by too little to be
+    seen in a mean: each must end where the optical depth is reached that was drawn for it."""
     flight = rig.flight(**axes)
     samples = flight.record(PATHS)
     cases.check_each_path(flight, samples, first_depths(rig.seed, *samples.t.shape))

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from freepath.catalog import Catalog
 from freepath.check.identities import check_clean, check_same_samples
-from freepath.check.model import TINY, Check
+from freepath.check.model import TINY
 from freepath.check.rig import Rig
-from freepath.check.suite.common import UPWARD
+from freepath.check.suite.common import UPWARD, Checks
 from freepath.check.verdict import Failure, demand, require
 from freepath.errors import VolumeError, imported
 from scipy import stats
@@ -19,20 +18,7 @@ from scipy import stats
 BILLION = 1_000_000_000
 
 
-def checks(catalog: Catalog) -> Iterator[Check]:
-    """The groups accumulation, long-runs and bad-input."""
-    for name, (group, label, sentence, function) in RUNS.items():
-        labels = (label, "hard", group)
-        yield Check(f"hard/{group}/{name}", labels, sentence, function, kernels="long-runs")
-    for name, make in BAD.items():
-        yield Check(
-            f"hard/bad-input/{name}",
-            ("fast", "hard", "bad-input", TINY),
-            "A volume that is not what it should be becomes an answer that looks like one: it is "
-            "refused, with its file, and the first voxel and count where values are wrong.",
-            _refused(make, name),
-            kernels="bad-input",
-        )
+checks = Checks()
 
 
 def _billion(rig: Rig, alpha: float, samples: int) -> None:
@@ -56,18 +42,21 @@ def _billion(rig: Rig, alpha: float, samples: int) -> None:
     demand(one.counters["steps"] >= total, "steps are lost")
 
 
+@checks.one("accumulation/sixteen-million", kernels="long-runs")
 def million(rig: Rig, alpha: float) -> None:
-    """What a billion is in less time."""
+    """A sum in float is wrong in the third digit after 1e7 values."""
     _billion(rig, alpha, 2**24)
 
 
+@checks.one("accumulation/billion", labels=("slow",), kernels="long-runs")
 def billion(rig: Rig, alpha: float) -> None:
-    """1e9."""
+    """Counts in 32 bits wrap, and sums in float stand still, before 1e9 samples."""
     _billion(rig, alpha, BILLION)
 
 
+@checks.one("accumulation/still-mean", kernels="long-runs")
 def still_mean(rig: Rig, alpha: float) -> None:
-    """All scores nearly 1: a mean in float would stand still."""
+    """Where all scores are nearly 1, the share of one is less than the last bit of the mean."""
     medium = {"homogeneous": {"sigma_t": 1e-5}}
     flight = rig.flight(tracker="ratio", medium=medium, rays=UPWARD, tightness=1e4, lanes=16)
     moments = flight.run(2047, 64).moments
@@ -77,8 +66,10 @@ def still_mean(rig: Rig, alpha: float) -> None:
     demand(abs(taken + np.expm1(-1e-5)) < stats.norm.isf(alpha / 2) * error + 2.0**-25, text)
 
 
+@checks.one("long-runs/far-numbers", kernels="long-runs")
 def far_numbers(rig: Rig, alpha: float) -> None:
-    """From 2^31, 2^32 and 2^40 on: other samples, of the same distribution."""
+    """A sample number that is cut to 31 or 32 bits repeats the run's beginning."""
+    # From 2^31, 2^32 and 2^40 on: other samples, of the same distribution.
     medium = {"homogeneous": {"sigma_t": 1.0}}
     flight = rig.flight(tracker="delta", medium=medium, rays=UPWARD, lanes=16)
     usual = flight.record(1024).t
@@ -92,8 +83,10 @@ def far_numbers(rig: Rig, alpha: float) -> None:
         require(np.array([p_value]), alpha / 3, f"mean from sample {first} on")
 
 
+@checks.one("long-runs/blocks", kernels="long-runs")
 def blocks(rig: Rig, alpha: float) -> None:
-    """Samples are the same however they are blocked and cut into launches."""
+    """Samples that are numbered within their block or launch repeat those of others."""
+    # Samples are the same however they are blocked and cut into launches.
     flight = rig.flight(tracker="delta", medium="trilinear", majorant="grid", lanes=16)
     one = flight.record(256)
     for other in (flight.record(64, blocks=4), flight.record(256, launches=7)):
@@ -101,8 +94,10 @@ def blocks(rig: Rig, alpha: float) -> None:
         check_same_samples(one.score, other.score, lookups, flight.rounding)
 
 
+@checks.one("long-runs/cut-launches", labels=("slow",), kernels="long-runs")
 def cut_launches(rig: Rig, alpha: float) -> None:
-    """A run of a second or two: no launch of it takes so long, and none of its samples is lost."""
+    """A launch of seconds is killed by watchdogs and cannot be cancelled."""
+    # A run of a second or two: no launch of it takes so long, and none of its samples is lost.
     medium = {"homogeneous": {"sigma_t": 1.0}}
     flight = rig.flight(
         tracker="ratio", medium=medium, rays=UPWARD, tightness=1000, lanes=16, record=False
@@ -127,8 +122,11 @@ def cut_launches(rig: Rig, alpha: float) -> None:
     demand(max(seconds) < 1.0, f"a launch took {max(seconds):.2f} s of {sum(seconds):.2f} s")
 
 
+@checks.one("accumulation/nonfinite", kernels="long-runs")
 def nonfinite(rig: Rig, alpha: float) -> None:
-    """Weights that overflow in two collisions, and then may be multiplied by 0."""
+    """A score that is infinite or no number, if it is dropped or not counted, leaves a mean that
+    looks like an answer."""
+    # Weights that overflow in two collisions, and then may be multiplied by 0.
     far_above = 2.0**83  # times its inverse it is a majorant of 1, exactly
     layers = {"breakpoints": [1.5], "values": [far_above, 1.0], "size": [1.0, 1.0, 3.0]}
     axes = {"medium": {"layered": layers}, "rays": {"orthographic": {"resolution": [8, 8]}}}
@@ -148,22 +146,21 @@ Make = Callable[[Path], str]
 """Writes a bad file; returns what the message must have beside its name."""
 
 
-def _refused(make: Make, name: str) -> Callable[[Rig, float], None]:
-    def run(rig: Rig, alpha: float) -> None:
-        suffix = name.rpartition("-in-")[2] if "-in-" in name else "npy"
-        path = rig.folder / f"{name}.{'tif' if name == 'not-an-image' else suffix}"
-        wanted = make(path)
-        medium = {"volume": {"file": str(path), "voxel_size": 0.25}}
-        try:
-            rig.flight(tracker="delta", medium=medium, lanes=1)
-        except VolumeError as error:
-            text = str(error)
-            demand(path.name in text, f"the message does not name the file: {text}")
-            demand(wanted in text, f"the message lacks '{wanted}': {text}")
-            return
-        raise Failure("the volume was taken for a good one")
-
-    return run
+def refused(rig: Rig, alpha: float, make: Make, name: str) -> None:
+    """A volume that is not what it should be becomes an answer that looks like one: it is refused,
+    with its file, and the first voxel and count where values are wrong."""
+    suffix = name.rpartition("-in-")[2] if "-in-" in name else "npy"
+    path = rig.folder / f"{name}.{'tif' if name == 'not-an-image' else suffix}"
+    wanted = make(path)
+    medium = {"volume": {"file": str(path), "voxel_size": 0.25}}
+    try:
+        rig.flight(tracker="delta", medium=medium, lanes=1)
+    except VolumeError as error:
+        text = str(error)
+        demand(path.name in text, f"the message does not name the file: {text}")
+        demand(wanted in text, f"the message lacks '{wanted}': {text}")
+        return
+    raise Failure("the volume was taken for a good one")
 
 
 def _save_slices(path: Path, values: np.ndarray) -> None:
@@ -230,48 +227,6 @@ BAD: dict[str, Make] = {
     "not-a-file-of-numpy": _bytes(b"\x93NUMPY" + struct.pack("<BBH", 9, 9, 4) + b"nope"),
     "not-an-image": _bytes(b"II*\x00 and nothing that follows"),
 }
-RUNS = {
-    "sixteen-million": (
-        "accumulation",
-        "fast",
-        "A sum in float is wrong in the third digit after 1e7 values.",
-        million,
-    ),
-    "billion": (
-        "accumulation",
-        "slow",
-        "Counts in 32 bits wrap, and sums in float stand still, before 1e9 samples.",
-        billion,
-    ),
-    "still-mean": (
-        "accumulation",
-        "fast",
-        "Where all scores are nearly 1, the share of one is less than the last bit of the mean.",
-        still_mean,
-    ),
-    "nonfinite": (
-        "accumulation",
-        "fast",
-        "A score that is infinite or no number, if it is dropped or not counted, leaves a mean "
-        "that looks like an answer.",
-        nonfinite,
-    ),
-    "far-numbers": (
-        "long-runs",
-        "fast",
-        "A sample number that is cut to 31 or 32 bits repeats the run's beginning.",
-        far_numbers,
-    ),
-    "blocks": (
-        "long-runs",
-        "fast",
-        "Samples that are numbered within their block or launch repeat those of others.",
-        blocks,
-    ),
-    "cut-launches": (
-        "long-runs",
-        "slow",
-        "A launch of seconds is killed by watchdogs and cannot be cancelled.",
-        cut_launches,
-    ),
-}
+for name, make in BAD.items():
+    options = {"labels": ("fast", TINY), "kernels": "bad-input", "make": make, "name": name}
+    checks.one(f"bad-input/{name}", **options)(refused)

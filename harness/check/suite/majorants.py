@@ -2,24 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from freepath.catalog import Catalog, Tracker
+from freepath.catalog import Tracker
 from freepath.check.cases import check_samples
 from freepath.check.identities import check_clean, check_mean
-from freepath.check.model import Check, is_bounding
+from freepath.check.model import is_bounding
 from freepath.check.rig import Rig
-from freepath.check.suite.common import (
-    FEW,
-    UPWARD,
-    hard,
-    homogeneous,
-    splits_off,
-    voxels,
-    walks,
-)
+from freepath.check.suite.common import FEW, UPWARD, Checks, homogeneous, splits_off, voxels, walks
 from freepath.check.verdict import Failure, demand, hearing
 from freepath.runner import STEP_CAP
 from scipy import stats
@@ -35,83 +26,18 @@ MOST = 16
 """Of exp(-x), summed over points x of a Poisson process of rate 1: more comes once in 1e20."""
 
 
-def checks(catalog: Catalog) -> Iterator[Check]:
-    """The groups non-bounding, loose and residual."""
-    for tightness in TOO_LOW:
-        yield from hard(
-            catalog,
-            ("non-bounding", f"{tightness}", not_bounding),
-            walks,
-            "A null coefficient that is negative, if clamped, biases silently: trackers that allow "
-            "it stay unbiased by signed weights, all others report the violations and their bias.",
-            tightness=tightness,
-        )
-    yield from hard(
-        catalog,
-        ("non-bounding", "growth", growth),
-        lambda t: walks(t) and not is_bounding(t),
-        "Weights grow where the majorant is too low: the variance that is reported must show it.",
-    )
-    yield from hard(
-        catalog,
-        ("non-bounding", "clamped-bias", clamped_bias),
-        lambda t: t.name in CLAMPED,
-        "A tracker that cannot do with a lower majorant sees the extinction cut off there: its "
-        "bias is exactly that, or violations hide another defect.",
-    )
-    yield from hard(
-        catalog,
-        ("loose", "1e3", loose),
-        walks,
-        "A majorant a thousand times too high costs time, nothing else: a weight that is rounded "
-        "the same way at each collision would drift.",
-    )
-    yield from hard(
-        catalog,
-        ("loose", "1e6", very_loose),
-        walks,
-        "With a million collisions a path a step cap is near: paths that meet it must be counted, "
-        "and all others right to a rounding for each collision.",
-    )
-    yield from hard(
-        catalog,
-        ("loose", "step-cap", step_cap),
-        lambda t: t.name in ("ratio", "split", "residual_ratio"),
-        "A path that would take a hundred million steps is cut off at the cap, and counted: "
-        "dropped in silence, it biases what is left.",
-    )
-    yield from hard(
-        catalog,
-        ("residual", "null-of-zero", null_of_zero),
-        lambda t: t.name in ANALOG,
-        "Where the majorant is the extinction, sigma_n is exactly 0: an approximate reciprocal "
-        "makes it -1e-8, and so a negative weight.",
-    )
-    for share, name in ((1.0, "control-is-extinction"), (1.3, "control-above")):
-        yield from hard(
-            catalog,
-            ("residual", name, controlled),
-            splits_off,
-            "A control that leaves nothing over, or less than nothing: no division by a residual "
-            "of 0, the right sign, or a violation that is counted.",
-            share=share,
-        )
-    yield from hard(
-        catalog,
-        ("residual", "control-everywhere", control_by_cell),
-        lambda t: splits_off(t) and not is_bounding(t),
-        "A control from the mean of a cell is above the extinction in a part of it: residuals "
-        "change sign within a cell.",
-    )
+checks = Checks()
 
 
 def _thin_voxels() -> np.ndarray:
     """An optical depth of about 0.2: so that weights stay known at a tenth of the majorant."""
-    return 0.3 * np.random.default_rng(11).random((8,) * 3) + 0.05
+    return 0.3 * np.random.default_rng(11).random((9, 5, 7)) + 0.05
 
 
 def not_bounding(rig: Rig, alpha: float, tracker: Tracker, tightness: float) -> None:
-    """Unbiased and signed; or counted and off."""
+    """A null coefficient that is negative, if clamped, biases silently: trackers that allow it stay
+    unbiased by signed weights, all others report the violations and their bias."""
+    # Unbiased and signed; or counted and off.
     flight = voxels(rig, tracker, _thin_voxels(), tightness=tightness)
     samples = flight.record(4096)
     found = samples.round
@@ -127,8 +53,9 @@ def not_bounding(rig: Rig, alpha: float, tracker: Tracker, tightness: float) -> 
         demand(found.counters["violations"] > 100, "violations are not counted")
 
 
+@checks.hard("non-bounding/growth", lambda t: walks(t) and not is_bounding(t))
 def growth(rig: Rig, alpha: float, tracker: Tracker) -> None:
-    """The lower, the larger the variance."""
+    """Weights grow where the majorant is too low: the variance that is reported must show it."""
     variance = [
         voxels(rig, tracker, _thin_voxels(), tightness=tightness).run(2048).variance or 0.0
         for tightness in (1.0, 0.1)
@@ -137,8 +64,11 @@ def growth(rig: Rig, alpha: float, tracker: Tracker) -> None:
     demand(variance[1] > variance[0] * (1.0 - 1e-6), text)
 
 
+@checks.hard("non-bounding/clamped-bias", lambda t: t.name in CLAMPED)
 def clamped_bias(rig: Rig, alpha: float, tracker: Tracker) -> None:
-    """Half of the extinction where the majorant is half of it."""
+    """A tracker that cannot do with a lower majorant sees the extinction cut off there: its bias is
+    exactly that, or violations hide another defect."""
+    # Half of the extinction where the majorant is half of it.
     axes: dict[str, Any] = {"tightness": 0.5, "rays": FEW}
     if splits_off(tracker):
         axes["parameters"] = {"control": "number", "share": 0}
@@ -160,14 +90,19 @@ def clamped_bias(rig: Rig, alpha: float, tracker: Tracker) -> None:
     raise Failure("no bias can be seen, expected that of half the extinction")
 
 
+@checks.hard("loose/1e3", walks)
 def loose(rig: Rig, alpha: float, tracker: Tracker) -> None:
-    """A thousand times too high."""
+    """A majorant a thousand times too high costs time, nothing else: a weight that is rounded the
+    same way at each collision would drift."""
     flight = voxels(rig, tracker, _thin_voxels(), tightness=1000, rays=FEW)
     check_samples(flight, flight.record(512), alpha)
 
 
+@checks.hard("loose/1e6", walks)
 def very_loose(rig: Rig, alpha: float, tracker: Tracker) -> None:
-    """A million times too high: within a rounding for each collision, or cut off and counted."""
+    """With a million collisions a path a step cap is near: paths that meet it must be counted, and
+    all others right to a rounding for each collision."""
+    # A million times too high: within a rounding for each collision, or cut off and counted.
     rays = {"orthographic": {"resolution": 2}}
     flight = homogeneous(rig, tracker, 0.7, tightness=1e6, rays=rays)
     # blocks of one sample: those of a block would follow each other in one lane
@@ -189,8 +124,11 @@ def very_loose(rig: Rig, alpha: float, tracker: Tracker) -> None:
     demand(error <= allowed, f"off by {error:.3g}, expected at most {allowed:.3g}")
 
 
+@checks.hard("loose/step-cap", lambda t: t.name in ("ratio", "split", "residual_ratio"))
 def step_cap(rig: Rig, alpha: float, tracker: Tracker) -> None:
-    """All paths, each after as many steps as the cap allows."""
+    """A path that would take a hundred million steps is cut off at the cap, and counted: dropped in
+    silence, it biases what is left."""
+    # All paths, each after as many steps as the cap allows.
     parameters = {"control": "number", "share": 0} if splits_off(tracker) else {}
     axes = {"tightness": 1e8, "rays": {"orthographic": {"resolution": 2}}}
     one = homogeneous(rig, tracker, 1.0, parameters=parameters, **axes).run(1, blocks=2)
@@ -200,8 +138,11 @@ def step_cap(rig: Rig, alpha: float, tracker: Tracker) -> None:
     demand(not one.counters["nonfinite"], "scores are no numbers")
 
 
+@checks.hard("residual/null-of-zero", lambda t: t.name in ANALOG)
 def null_of_zero(rig: Rig, alpha: float, tracker: Tracker) -> None:
-    """Extinctions whose reciprocals are not exact."""
+    """Where the majorant is the extinction, sigma_n is exactly 0: an approximate reciprocal makes
+    it -1e-8, and so a negative weight."""
+    # Extinctions whose reciprocals are not exact.
     for sigma in (1.0 / 3.0, 0.7, 1.1, 1.9):
         flight = homogeneous(rig, tracker, sigma, rays=UPWARD, tightness=1)
         samples = flight.record(2048)
@@ -211,7 +152,8 @@ def null_of_zero(rig: Rig, alpha: float, tracker: Tracker) -> None:
 
 
 def controlled(rig: Rig, alpha: float, tracker: Tracker, share: float) -> None:
-    """A control of so much of the extinction."""
+    """A control that leaves nothing over, or less than nothing: no division by a residual of 0, the
+    right sign, or a violation that is counted."""
     parameters = {"control": "mean", "share": share}
     flight = homogeneous(rig, tracker, 1.5, rays=UPWARD, parameters=parameters)
     samples = flight.record(2048)
@@ -224,8 +166,16 @@ def controlled(rig: Rig, alpha: float, tracker: Tracker, share: float) -> None:
     check_samples(flight, samples, alpha)
 
 
+@checks.hard("residual/control-everywhere", lambda t: splits_off(t) and not is_bounding(t))
 def control_by_cell(rig: Rig, alpha: float, tracker: Tracker) -> None:
-    """The mean of each cell."""
+    """A control from the mean of a cell is above the extinction in a part of it: residuals change
+    sign within a cell."""
     parameters = {"control": "mean", "share": 1.2}
     flight = voxels(rig, tracker, 6.0 * _thin_voxels(), parameters=parameters)
     check_samples(flight, flight.record(1024), alpha)
+
+
+for tightness in TOO_LOW:
+    checks.hard(f"non-bounding/{tightness}", walks, tightness=tightness)(not_bounding)
+for share, name in ((1.0, "control-is-extinction"), (1.3, "control-above")):
+    checks.hard(f"residual/{name}", splits_off, share=share)(controlled)

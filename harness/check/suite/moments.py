@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,10 +20,6 @@ SAMPLES = 4096
 THICKEST = 2.0
 """The optical depth beyond which weights have so heavy a tail that the variance of a sample says
 little about the variance."""
-SENTENCE = (
-    "An estimator may be right on average and play where it should weigh, or look up twice: its "
-    "variance and its lookups must be those that are derived for it."
-)
 RELATIVES: dict[str, tuple[dict[str, Any], float, Callable[..., known.Expected]]] = {
     "weighted_delta": ({}, 1.5, known.free(1.0)),
     "weighted_delta-not-bounded": ({}, 0.8, known.free(1.0)),
@@ -35,10 +32,10 @@ RELATIVES: dict[str, tuple[dict[str, Any], float, Callable[..., known.Expected]]
     "split": ({}, 1.5, known.ratio),
     "residual_ratio": ({}, 1.5, known.residual_ratio),
     "residual_ratio-1.2": ({"control": "minorant", "share": 1.2}, 1.5, known.residual_ratio),
-    "decomposition": ({}, 1.5, known.decomposition),
+    "decomposition": ({}, 1.5, known.binary),
     "weighted_decomposition": ({"share": 0.3}, 1.5, known.weighted_decomposition),
-    "next_flight_delta": ({}, 1.5, known.binary_cost),
-    "next_flight_ratio": ({}, 1.5, known.ratio_cost),
+    "next_flight_delta": ({}, 1.5, known.cost_of(known.binary)),
+    "next_flight_ratio": ({}, 1.5, known.cost_of(known.ratio)),
     "track_length": ({}, 1.5, known.track_length_cost),
 }  # fmt: skip
 
@@ -50,42 +47,35 @@ def checks(catalog: Catalog) -> Iterator[Check]:
             for j, majorant in enumerate(MAJORANTS):
                 axes = {"tracker": tracker, "medium": medium, "majorant": majorant}
                 axes |= {"tightness": 1.5, "lanes": (16, 1)[(m + j) % 2]}
-                yield _check(f"{tracker}/{medium}/{majorant}", tracker, _exactly(axes, expected))
-    for name, (parameters, tightness, expected) in RELATIVES.items():
+                yield _check(f"{tracker}/{medium}/{majorant}", tracker, axes, expected)
+    for name, (parameters, tightness, known_of) in RELATIVES.items():
         tracker = name.partition("-")[0]
         for medium in ("exponential", "trilinear"):
             axes = {"tracker": {tracker: parameters}, "medium": medium, "tightness": tightness}
-            yield _check(f"{name}/{medium}/global", tracker, _relative(axes, expected))
+            expected = partial(_relative, known_of)
+            yield _check(f"{name}/{medium}/global", tracker, axes | {"lanes": 16}, expected)
 
 
-def _check(name: str, tracker: str, run: Callable[[Rig, float], None]) -> Check:
+def _check(name: str, tracker: str, axes: dict[str, Any], expected: Any) -> Check:
     speed = "fast" if "/trilinear/" in name and tracker in EXACT else "slow"
-    labels = (speed, "moments", tracker)
     kernels = f"{tracker}/transmittance/{name.partition('/')[2]}"
-    return Check(f"moments/{name}", labels, SENTENCE, run, kernels=kernels)
+    options = {"kernels": kernels, "axes": axes, "expected": expected}
+    return Check.of(f"moments/{name}", (speed, "moments", tracker), as_derived, **options)
 
 
-def _exactly(axes: dict[str, Any], expected: Callable[..., Any]) -> Callable[[Rig, float], None]:
-    def run(rig: Rig, alpha: float) -> None:
-        flight = rig.flight(**axes)
-        variance, lookups = expected(flight)
-        _compare(flight, alpha, variance, lookups)
-
-    return run
+def _relative(known_of: Callable[..., known.Expected], flight: Flight) -> known.Expected:
+    along = known.AlongRays(flight)
+    second, lookups = known_of(along)
+    return None if second is None else second - along.transmittance**2, lookups
 
 
-def _relative(axes: dict[str, Any], expected: Callable[..., Any]) -> Callable[[Rig, float], None]:
-    def run(rig: Rig, alpha: float) -> None:
-        flight = rig.flight(**axes, lanes=16)
-        along = known.AlongRays(flight)
-        second, lookups = expected(along)
-        variance = None if second is None else second - along.transmittance**2
-        _compare(flight, alpha, variance, lookups)
-
-    return run
-
-
-def _compare(flight: Flight, alpha: float, variance: Any, lookups: Any) -> None:
+def as_derived(
+    rig: Rig, alpha: float, axes: dict[str, Any], expected: Callable[[Flight], known.Expected]
+) -> None:
+    """An estimator may be right on average and play where it should weigh, or look up twice: its
+    variance and its lookups must be those that are derived for it."""
+    flight = rig.flight(**axes)
+    variance, lookups = expected(flight)
     samples = flight.record(SAMPLES)
     check_mean(samples.round.moments, flight.reference(), alpha / 3)
     check_count(samples.lookups, lookups, alpha / 3)

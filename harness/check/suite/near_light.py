@@ -3,57 +3,28 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from freepath.catalog import Catalog
 from freepath.check.double_scattering import double_scattering
 from freepath.check.identities import check_clean, check_mean
-from freepath.check.model import Check
 from freepath.check.rig import Flight, Rig
+from freepath.check.suite.common import Checks
 from freepath.check.suite.scattering import FEW, PHASES, PLACES, follow, homogeneous, light
 from freepath.stats import Moments
 
 ALBEDO, SIGMA_T = 0.5, 2.0
-ONCE = (
-    "The phase function is drawn from a table over the angle, which a light beside the ray, far "
-    "away or behind it narrows to nothing: the mean must stay that of the integral."
-)
-TWICE = (
-    "Two vertices have one density, of three variables whose factors cancel: a factor that is "
-    "lost is no more than another light, but for an integral over all of them."
-)
-
-
-def checks(catalog: Catalog) -> Iterator[Check]:
-    """Of the tracker `joint`, and of delta tracking where its variance is finite."""
-    for place, (phase, g) in itertools.product(PLACES, PHASES.items()):
-        options = {"sampler": {"joint": {}}, "place": place, "g": g}
-        yield _check(f"light/{place}/joint-{phase}", "joint", ONCE, "fast", light, options)
-        yield _check(f"double/{place}/joint-{phase}", "joint", TWICE, "slow", double, options)
-    for name, given in {"cells": {"cells": 1}, "share": {"share": 0.9}}.items():
-        few = {"sampler": {"joint": given}, "place": "inside", "g": 0.9}
-        yield _check(f"double/inside/joint-{name}", "joint", TWICE, "slow", double, few)
-    plain = {"sampler": "delta", "place": "outside", "g": 0.0}
-    yield _check("double/outside/delta", "delta", TWICE, "slow", double, plain)
-
-
-def _check(
-    name: str, tracker: str, sentence: str, label: str, situation: Any, options: dict[str, Any]
-) -> Check:
-    def run(rig: Rig, alpha: float) -> None:
-        situation(rig, alpha, tracker=tracker, **options)
-
-    labels = (label, "hard", "scattering", tracker)
-    kernels = f"scattering/{name.split('/', maxsplit=1)[0]}/{tracker}"
-    return Check(f"hard/scattering/{name}", labels, sentence, run, kernels=kernels)
+ONCE = """The phase function is drawn from a table over the angle, which a light beside the ray, far
+away or behind it narrows to nothing: the mean must stay that of the integral."""
+checks = Checks()
 
 
 def double(
     rig: Rig, alpha: float, tracker: str, sampler: Any, place: str, g: float, **axes: Any
 ) -> None:
-    """Light that scatters once and twice, against both integrals."""
+    """Two vertices have one density, of three variables whose factors cancel: a factor that is lost
+    is no more than another light, but for an integral over all of them."""
+    # Light that scatters once and twice, against both integrals.
     position = np.array(PLACES[place])
     intensity = 10 * max(1.0, abs(position[2])) ** 2
     twice = _fly(rig, sampler, position, intensity, g, 2, **axes)
@@ -81,3 +52,19 @@ def _fly(
         rays=FEW,
         **axes,
     )
+
+
+def _one(name: str, situation: Any, *labels: str, **options: Any) -> None:
+    tracker = options.pop("tracker", "joint")
+    checks.one(f"scattering/{name}", tracker, labels=labels, **options)(situation)
+
+
+for place, (phase, g) in itertools.product(PLACES, PHASES.items()):
+    options = {"sampler": {"joint": {}}, "place": place, "g": g}
+    _one(f"light/{place}/joint-{phase}", light, "fast", sentence=ONCE, **options)
+    _one(f"double/{place}/joint-{phase}", double, "slow", **options)
+for name, given in {"cells": {"cells": 1}, "share": {"share": 0.9}}.items():
+    few = {"sampler": {"joint": given}, "place": "inside", "g": 0.9}
+    _one(f"double/inside/joint-{name}", double, "slow", **few)
+plain = {"sampler": "delta", "place": "outside", "g": 0.0, "tracker": "delta"}
+_one("double/outside/delta", double, "slow", **plain)

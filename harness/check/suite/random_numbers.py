@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
-from freepath.catalog import Catalog, Tracker
+from freepath.catalog import Tracker
 from freepath.check.generators import philox, stream, xoshiro
 from freepath.check.media import MEDIA
-from freepath.check.model import TINY, Check
+from freepath.check.model import TINY
 from freepath.check.parts import Lanes
 from freepath.check.rig import Change, Rig
-from freepath.check.suite.common import everyone, fly, hard
+from freepath.check.suite.common import Checks, everyone, fly, has_free_path, knows_depth
 from freepath.check.verdict import demand, require
 from freepath.config.models import MEDIA as MODELS
 from scipy import stats
@@ -41,71 +40,28 @@ ENDS = Change(
     "    return to_real(ends) * (SCALAR)5.9604644775390625e-8;",
 )
 
-Body = Callable[[Rig, float, int], None]
+
+checks = Checks()
 
 
-def checks(catalog: Catalog) -> Iterator[Check]:
-    """The group's checks: of the generators in one lane and in sixteen, of all samplers."""
-    for name, (sentence, body) in PARTS.items():
-        for lanes in (1, 16):
-            yield _part(name, sentence, body, lanes)
-    for name in ULP:
-        yield _part(
-            f"logarithm-{name}",
-            "A logarithm that is off, or not monotone, near 1 or at 2^-24 bends every free path.",
-            lambda rig, alpha, lanes, name=name: logarithm(rig, lanes, name),
-            16,
-        )
-    yield _part(
-        "never-1",
-        "1e9 draws never give 1: its logarithm would be infinite, and a float conversion that "
-        "rounds up gives it once in 33 million.",
-        never_1,
-        16,
-        speed="slow",
-    )
-    yield from hard(
-        catalog,
-        (GROUP, "ends", ends),
-        everyone,
-        "With u = 0, 2^-24 and 1 - 2^-24 fed into every decision, a sampler that divides by what "
-        "is left, or takes the logarithm of 0, becomes no number or runs on for ever.",
-    )
-    for tracker in catalog.trackers.values():
-        if "closed_form" in tracker.needs and "free_path" in tracker.estimands:
-            yield from (_inverse(tracker, m) for m in MEDIA if _closed(m))
+def part(name: str, lanes: tuple[int, ...] = (1, 16), /, **options: Any) -> Any:
+    """Decorate a check of a part of the kernels in so many lanes."""
+
+    def declare(function: Any) -> Any:
+        for count in lanes:
+            tiny = (TINY,) if options.get("tiny") and count == 1 else ()
+            own = {key: value for key, value in options.items() if key != "tiny"} | {"lanes": count}
+            own["labels"] = (*own.get("labels", ("fast",)), *tiny)
+            checks.one(f"{GROUP}/{name}/{count}-lanes", kernels=GROUP, **own)(function)
+        return function
+
+    return declare
 
 
-def _closed(medium: str) -> bool:
-    (kind,) = MEDIA[medium]
-    return "closed_form" in MODELS[kind].OFFERS
-
-
-def _part(name: str, sentence: str, body: Body, lanes: int, speed: str = "fast") -> Check:
-    def run(rig: Rig, alpha: float) -> None:
-        body(rig, alpha, lanes)
-
-    full = f"hard/{GROUP}/{name}/{lanes}-lanes"
-    tiny = (TINY,) if body in (known_answers, published) and lanes == 1 else ()
-    return Check(full, (speed, "hard", GROUP, *tiny), sentence, run, kernels=GROUP)
-
-
-def _inverse(tracker: Tracker, medium: str) -> Check:
-    def run(rig: Rig, alpha: float) -> None:
-        ends(rig, alpha, tracker, medium)
-
-    return Check(
-        f"hard/{GROUP}/inverse-{medium}/{tracker.name}",
-        ("fast", "hard", GROUP, tracker.name),
-        "The inverse of a closed form at u = 0 and at the largest u divides 0 by 0, or Newton's "
-        "method leaves its bracket.",
-        run,
-        kernels=f"{tracker.name}/free_path/{medium}/global",
-    )
-
-
+@part("known-answers", tiny=True)
 def known_answers(rig: Rig, alpha: float, lanes: int) -> None:
-    """Of the generator's authors, in each lane."""
+    """A swapped word or key makes a generator that only looks random."""
+    # Of the generator's authors, in each lane.
     for counter, key, expected in KNOWN:
         body = f"const Rng c = {{in0, in1, in2, in3}}; rng = philox(c, {key[0]}u, {key[1]}u);"
         found = Lanes(rig, lanes)(body + WORDS, [[word] for word in counter], ["bits"] * 4, 40)
@@ -113,8 +69,10 @@ def known_answers(rig: Rig, alpha: float, lanes: int) -> None:
             demand((words == word).all(), f"{words.flat[0]:#x} for {counter}, expected {word:#x}")
 
 
+@part("own-counters")
 def own_counters(rig: Rig, alpha: float, lanes: int) -> None:
-    """Each lane has the answer of its own."""
+    """Lanes that mix their counters draw the same numbers."""
+    # Each lane has the answer of its own.
     counters = np.random.default_rng(1).integers(0, 2**32, (4, 48))
     body = f"const Rng c = {{in0, in1, in2, in3}}; rng = philox(c, 1u, 2u);{WORDS}"
     found = np.hstack(Lanes(rig, lanes)(body, counters, ["bits"] * 4, 48))
@@ -122,8 +80,10 @@ def own_counters(rig: Rig, alpha: float, lanes: int) -> None:
     demand(same.all(), f"{np.count_nonzero(~same)} of {same.size} words are of other counters")
 
 
+@part("published", tiny=True)
 def published(rig: Rig, alpha: float, lanes: int) -> None:
-    """A hundred numbers of forty states; the first of 1, 2, 3, 4 are the authors'."""
+    """A generator with another rotation fails tests only its authors ran."""
+    # A hundred numbers of forty states; the first of 1, 2, 3, 4 are the authors'.
     states = np.random.default_rng(2).integers(0, 2**32, (4, 40))
     states[:, 0] = 1, 2, 3, 4
     body = "if (n == 0) { rng.s0 = in0; rng.s1 = in1; rng.s2 = in2; rng.s3 = in3; }"
@@ -136,8 +96,10 @@ def published(rig: Rig, alpha: float, lanes: int) -> None:
     demand(found[0, :5].tolist() == authors, "its first numbers are not the authors'")
 
 
+@part("streams")
 def streams(rig: Rig, alpha: float, lanes: int) -> None:
-    """Of rays and samples beyond 2^32."""
+    """Sample numbers that wrap at 2^32 repeat the samples of a long run."""
+    # Of rays and samples beyond 2^32.
     rays, offsets = np.array([0, 1, 7, 2**31, 2**32 - 1]), np.array([0, 1, 5, 2**31, 2**32 - 1])
     for first in (0, 2**32 - 3, 2**40 + 2**32 - 1):
         body = f"rng = stream({2**53 + 5}ul, in0, {first}ul, in1);{WORDS}"
@@ -146,8 +108,10 @@ def streams(rig: Rig, alpha: float, lanes: int) -> None:
         demand((found == expected).all(), f"other streams than Philox gives from {first} on")
 
 
+@part("disjoint")
 def disjoint(rig: Rig, alpha: float, lanes: int) -> None:
-    """A million of 64 rays, from starts on either side of 2^32."""
+    """Samples that share a stream have errors that do not average out."""
+    # A million of 64 rays, from starts on either side of 2^32.
     ray, offset = np.meshgrid(np.arange(64), np.arange(2**13), indexing="ij")
     seen = []
     for first in (0, 2**32 - 2**12):
@@ -162,8 +126,10 @@ def disjoint(rig: Rig, alpha: float, lanes: int) -> None:
     demand(shared == 0, f"{shared} of {len(states)} samples share a stream")
 
 
+@part("extremes")
 def extremes(rig: Rig, alpha: float, lanes: int) -> None:
-    """The smallest and largest bits: in [0, 1), and finite."""
+    """u = 1 or log 0 is infinite, and 0 must be a depth of 0."""
+    # The smallest and largest bits: in [0, 1), and finite.
     # from s0 = 0 the generator returns s3 rotated by 7
     body = "if (n == 0) { rng.s0 = (bits)0; rng.s1 = rng.s2 = (bits)1; rng.s3 = in0; }"
     body += "Rng copy = rng; out0 = uniform(&rng); out1 = exponential(&copy);"
@@ -176,8 +142,10 @@ def extremes(rig: Rig, alpha: float, lanes: int) -> None:
     demand(abs(depth[1, 0] / largest - 1.0) < 1e-6, f"1 - 2^-24 gives {depth[1, 0]}")
 
 
+@part("distribution")
 def distribution(rig: Rig, alpha: float, lanes: int) -> None:
-    """Sixteen million draws, with the whole of the exponential's tail."""
+    """An epsilon in log(1 - u + eps) cuts the tail of free paths."""
+    # Sixteen million draws, with the whole of the exponential's tail.
     count, draws = 2**16, 2**8
     body = "if (n == 0) rng = stream(seed, in0, 0ul, in1);"
     body += "Rng copy = rng; out0 = uniform(&rng); out1 = exponential(&copy);"
@@ -201,8 +169,10 @@ def distribution(rig: Rig, alpha: float, lanes: int) -> None:
     require(np.array(p_values), alpha, "uniform, correlations (2), tail beyond 1, 5, 10, 13, 16")
 
 
+@part("twenty-free-paths")
 def twenty_free_paths(rig: Rig, alpha: float, lanes: int) -> None:
-    """P(X > 20) = 2e-9 as a sum of two depths: a path's depth, as collisions add them up."""
+    """A tail that is cut shows first far out."""
+    # P(X > 20) = 2e-9 as a sum of two depths: a path's depth, as collisions add them up.
     count, draws = 2**16, 2**8
     body = "if (n == 0) rng = stream(seed, in0, 1ul, in1);"
     body += "out0 = exponential(&rng) + exponential(&rng) + exponential(&rng) + exponential(&rng);"
@@ -216,8 +186,11 @@ def twenty_free_paths(rig: Rig, alpha: float, lanes: int) -> None:
     require(p_value, alpha, "share beyond 20 mean free paths", found, expected)
 
 
+@part("never-1", (16,), labels=("slow",))
 def never_1(rig: Rig, alpha: float, lanes: int) -> None:
-    """On the device: the largest of a hundred thousand draws of ten thousand streams."""
+    """1e9 draws never give 1: its logarithm would be infinite, and a float conversion that rounds
+    up gives it once in 33 million."""
+    # On the device: the largest of a hundred thousand draws of ten thousand streams.
     count, inner = 2**14, 2**16
     body = f"""
     rng = stream(seed, in0, 2ul, in1);
@@ -230,8 +203,9 @@ def never_1(rig: Rig, alpha: float, lanes: int) -> None:
     demand(most.max() == 1.0 - 2.0**-24, "the largest uniform was not met in 1e9 draws")
 
 
-def logarithm(rig: Rig, lanes: int, name: str) -> None:
-    """All 2^24 values of 1 - u."""
+def logarithm(rig: Rig, alpha: float, lanes: int, name: str) -> None:
+    """A logarithm that is off, or not monotone, near 1 or at 2^-24 bends every free path."""
+    # All 2^24 values of 1 - u.
     k = np.arange(2**24, dtype=np.uint32)
     body = "out0 = logarithm((SCALAR)1 - to_real(in0) * 0x1p-24f);"
     (found,) = Lanes(rig, lanes, name)(body, [k], ["real"], len(k))
@@ -244,8 +218,11 @@ def logarithm(rig: Rig, lanes: int, name: str) -> None:
     demand((np.diff(found) <= 0.0).all(), "it falls where its argument rises")
 
 
+@checks.hard("random-numbers/ends", everyone)
 def ends(rig: Rig, alpha: float, tracker: Tracker, medium: str = "") -> None:
-    """Finite and within the ray, whatever is drawn; a path that goes on is cut off and counted."""
+    """With u = 0, 2^-24 and 1 - 2^-24 fed into every decision, a sampler that divides by what is
+    left, or takes the logarithm of 0, becomes no number or runs on for ever."""
+    # Finite and within the ray, whatever is drawn; a path that goes on is cut off and counted.
     rig = rig.with_change(ENDS)
     medium = medium or ("layered" if "closed_form" in tracker.needs else "trilinear")
     axes: dict[str, Any] = {"estimand": tracker.estimands[-1], "tightness": 1.5}
@@ -261,16 +238,14 @@ def ends(rig: Rig, alpha: float, tracker: Tracker, medium: str = "") -> None:
     demand(beyond <= 1e-5, f"a path ends {beyond:.3g} beyond its ray")
 
 
-PARTS: dict[str, tuple[str, Body]] = {
-    "known-answers": (
-        "A swapped word or key makes a generator that only looks random.",
-        known_answers,
-    ),
-    "own-counters": ("Lanes that mix their counters draw the same numbers.", own_counters),
-    "published": ("A generator with another rotation fails tests only its authors ran.", published),
-    "streams": ("Sample numbers that wrap at 2^32 repeat the samples of a long run.", streams),
-    "disjoint": ("Samples that share a stream have errors that do not average out.", disjoint),
-    "extremes": ("u = 1 or log 0 is infinite, and 0 must be a depth of 0.", extremes),
-    "distribution": ("An epsilon in log(1 - u + eps) cuts the tail of free paths.", distribution),
-    "twenty-free-paths": ("A tail that is cut shows first far out.", twenty_free_paths),
-}
+for name in ULP:
+    part(f"logarithm-{name}", (16,), name=name)(logarithm)
+for medium in MEDIA:
+    if "closed_form" in MODELS[next(iter(MEDIA[medium]))].OFFERS:
+        checks.hard(
+            f"{GROUP}/inverse-{medium}",
+            lambda t: knows_depth(t) and has_free_path(t),
+            sentence="""The inverse of a closed form at u = 0 and at the largest u divides 0 by
+            0, or Newton's method leaves its bracket.""",
+            medium=medium,
+        )(ends)

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 from freepath import kernel_files
-from freepath.catalog import Catalog
 from freepath.check.identities import check_clean, check_mean
-from freepath.check.model import Check
 from freepath.check.parts import Lanes
 from freepath.check.rig import Flight, Rig
+from freepath.check.suite.channels import check_any
+from freepath.check.suite.common import Checks
 from freepath.check.verdict import demand, require
 from freepath.stats import Moments
 from scipy import stats
@@ -47,84 +46,11 @@ SHARING = (
     ("delta", "delta"), ("delta", "split"), ("spectral", "spectral_ratio"),
 )  # fmt: skip
 """Pairs of which lanes on paths and on shadow rays share a lookup, where there is one to share."""
-EMITTED = ("delta", "analytic", "regular", "weighted_delta", "two_knob")
+EMITTED = ("delta", "analytic", "regular", "weighted_delta", "two_knob", "spectral")
 TOGETHER = (("regular", "regular"), ("weighted_delta", "ratio"))
 ANISOTROPIES = {"0.999": 0.999, "-0.999": -0.999, "1e-7": 1e-7, "-1e-9": -1e-9, "0.3": 0.3}
 GRAIN = 2.0**-23
-SENTENCES = {
-    "furnace": "In a furnace without absorption every path brings the same, whatever it meets: a "
-    "weight that drifts, a path that is lost or a direction off by a little shows at once.",
-    "emission": "Emission counted at null collisions, or without the share that is absorbed, still "
-    "looks like a glowing cloud; the transfer equation says how bright it is.",
-    "rod": "Roulette, albedo and the end of a path multiply: reflection and transmission of the "
-    "rod model are known, and what is missing of 1 is absorbed.",
-    "length": "Directions that are not uniform, or paths that do not end at the boundary, change "
-    "the mean length of paths, which is 4 V / S whatever the density.",
-    "single": "A phase function, a distance squared or a shadow ray that is off by a factor is no "
-    "more than another light; single scattering has an integral.",
-    "voxels": "Lanes on paths and on shadow rays that share a lookup must not take over each "
-    "other's weights; in voxels that are all alike the integral is that of a homogeneous medium.",
-    "light": "Distances that are drawn for a light lose their digits beside it, far away from it "
-    "and on its line; the mean must stay that of the integral.",
-    "several": "Beyond one scattering there is no reference: trackers are held against each other.",
-    "phase": "A phase function that is not sampled as it is evaluated brings light that is not "
-    "there; near 0 and 1 its closed form divides 0 by 0.",
-}
-
-
-def checks(catalog: Catalog) -> Iterator[Check]:
-    """The group scattering."""
-    yield from _without_reference()
-    yield from _paths()
-    yield from _lights()
-
-
-def _without_reference() -> Iterator[Check]:
-    for (phase, g), depth in itertools.product(PHASES.items(), (1, 10, 100)):
-        for kind in ("homogeneous", "grid"):
-            name = f"furnace/{kind}-tau-{depth}-{phase}"
-            yield _check(name, "delta", furnace, kind=kind, sigma_t=depth, g=g)
-    for kind in ("grid", "stretched"):
-        yield _check(f"furnace/{kind}", "regular", furnace, kind=kind, sigma_t=30, g=0.9)
-    for tracker in NEAR_TRACKERS:
-        yield _check(f"several/ratio/{tracker}", tracker, several, shadow="ratio")
-    for tracker, shadow in TOGETHER:
-        yield _check(f"several/{shadow}/{tracker}", tracker, several, shadow=shadow)
-
-
-def _paths() -> Iterator[Check]:
-    for tracker in EMITTED:
-        yield _check("emission", tracker, emission)
-    for albedo, depth in itertools.product((0.3, 0.9), (0.5, 2.0, 8.0)):
-        yield _check(f"rod/albedo-{albedo}-tau-{depth}", "delta", rod, albedo=albedo, depth=depth)
-    for sigma_t, g in itertools.product((0.1, 3.0, 30.0), (0.0, 0.7)):
-        yield _check(f"length/tau-{sigma_t}-g-{g}", "delta", length, sigma_t=sigma_t, g=g)
-
-
-def _lights() -> Iterator[Check]:
-    for (tracker, shadow), g in itertools.product(SHADOWS, (0.0, 0.6)):
-        yield _check(f"single/{shadow}-g-{g}", tracker, single, shadow=shadow, g=g)
-    for (tracker, shadow), g in itertools.product(SHARING, (0.0, 0.6)):
-        yield _check(f"voxels/{shadow}-g-{g}", tracker, voxels, shadow=shadow, g=g)
-    for (name, sampler), place in itertools.product(NEAR.items(), PLACES):
-        (tracker,) = sampler
-        yield _check(f"light/{place}/{name}", tracker, light, sampler=sampler, place=place)
-    for name, g in ANISOTROPIES.items():
-        yield _check(f"phase/g-{name}", "", phase_function, g=g)
-
-
-def _check(name: str, tracker: str, situation: Any, **options: Any) -> Check:
-    kind = name.split("/", maxsplit=1)[0]
-    if tracker:
-        options["tracker"] = tracker
-
-    def run(rig: Rig, alpha: float) -> None:
-        situation(rig, alpha, **options)
-
-    full = name if not tracker or name.endswith(tracker) else f"{name}/{tracker}"
-    labels = ("fast", "hard", GROUP, *([tracker] if tracker else []))
-    kernels = f"{GROUP}/{kind}/{tracker}"
-    return Check(f"hard/{GROUP}/{full}", labels, SENTENCES[kind], run, kernels=kernels)
+checks = Checks()
 
 
 def follow(rig: Rig, tracker: Any, medium: Any, **axes: Any) -> Flight:
@@ -139,7 +65,9 @@ def homogeneous(sigma_t: float = 2.0, **keys: Any) -> dict[str, Any]:
 
 
 def furnace(rig: Rig, alpha: float, tracker: str, kind: str, **keys: Any) -> None:
-    """Every path brings the environment's radiance, but for roundings of weights."""
+    """In a furnace without absorption every path brings the same, whatever it meets: a weight that
+    drifts, a path that is lost or a direction off by a little shows at once."""
+    # Every path brings the environment's radiance, but for roundings of weights.
     keys["albedo"] = 1
     if kind == "stretched":
         # directions are turned in the world, where voxels need not be cubes
@@ -156,16 +84,23 @@ def furnace(rig: Rig, alpha: float, tracker: str, kind: str, **keys: Any) -> Non
 
 
 def emission(rig: Rig, alpha: float, tracker: str) -> None:
-    """A glowing medium that does not scatter, before a bright background."""
-    medium = homogeneous(1.5, emission=3)
-    flight = follow(rig, tracker, medium, light={"uniform": {"radiance": 0.5}})
+    """Emission counted at null collisions, or without the share that is absorbed, still looks like
+    a glowing cloud; the transfer equation says how bright it is."""
+    # A glowing medium that does not scatter, before a bright background.
+    keys, radiance = {"emission": 3}, 0.5
+    if tracker == "spectral":
+        keys, radiance = {"emission": [3, 1, 0.2], "channels": [1, 0.6, 0.3]}, [0.5, 0.1, 2.0]
+    light = {"uniform": {"radiance": radiance}}
+    flight = follow(rig, tracker, homogeneous(1.5, **keys), light=light)
     one = flight.run(4096)
     check_clean(one, bounded=True)
-    check_mean(one.moments, flight.reference(), alpha)
+    check_any(one.moments, flight.reference(), alpha)
 
 
 def rod(rig: Rig, alpha: float, tracker: str, albedo: float, depth: float) -> None:
-    """Transmission and reflection together; of emission, what is missing of a furnace."""
+    """Roulette, albedo and the end of a path multiply: reflection and transmission of the rod model
+    are known, and what is missing of 1 is absorbed."""
+    # Transmission and reflection together; of emission, what is missing of a furnace.
     through, back = rod_model(albedo, depth)
     lit = homogeneous(depth, albedo=albedo, phase="rod")
     one = follow(rig, tracker, lit, rays=FEW).run(8192)
@@ -176,7 +111,9 @@ def rod(rig: Rig, alpha: float, tracker: str, albedo: float, depth: float) -> No
 
 
 def length(rig: Rig, alpha: float, tracker: str, sigma_t: float, g: float) -> None:
-    """4 V / S under isotropic uniform light (Blanco and Fournier 2003)."""
+    """Directions that are not uniform, or paths that do not end at the boundary, change the mean
+    length of paths, which is 4 V / S whatever the density."""
+    # 4 V / S under isotropic uniform light (Blanco and Fournier 2003).
     size = np.array(SIZE)
     medium = homogeneous(sigma_t, albedo=1, g=g, size=SIZE)
     rays = {"chords": {"count": 8192}}
@@ -191,7 +128,9 @@ def length(rig: Rig, alpha: float, tracker: str, sigma_t: float, g: float) -> No
 
 
 def single(rig: Rig, alpha: float, tracker: str, shadow: str, g: float) -> None:
-    """A point light outside of a homogeneous medium."""
+    """A phase function, a distance squared or a shadow ray that is off by a factor is no more than
+    another light; single scattering has an integral."""
+    # A point light outside of a homogeneous medium.
     medium = homogeneous(albedo=0.5, g=g)
     flight = follow(rig, tracker, medium, light=POINT, scatterings=1, shadow=shadow)
     one = flight.run(8192)
@@ -200,7 +139,9 @@ def single(rig: Rig, alpha: float, tracker: str, shadow: str, g: float) -> None:
 
 
 def voxels(rig: Rig, alpha: float, tracker: str, shadow: str, g: float) -> None:
-    """A point light outside of voxels that are all alike."""
+    """Lanes on paths and on shadow rays that share a lookup must not take over each other's
+    weights; in voxels that are all alike the integral is that of a homogeneous medium."""
+    # A point light outside of voxels that are all alike.
     optics = {"sigma_t": 2.0, "albedo": 0.5, "g": g}
     axes = {"light": POINT, "scatterings": 1, "shadow": shadow, "tightness": 1.5}
     medium = rig.volume(np.ones((4, 4, 4)), voxel_size=0.25, **optics)
@@ -212,7 +153,9 @@ def voxels(rig: Rig, alpha: float, tracker: str, shadow: str, g: float) -> None:
 def light(
     rig: Rig, alpha: float, tracker: str, sampler: dict[str, Any], place: str, g: float = 0.3
 ) -> None:
-    """A sampler of light, with the light outside, inside, far away, or close to a ray."""
+    """Distances that are drawn for a light lose their digits beside it, far away from it and on its
+    line; the mean must stay that of the integral."""
+    # A sampler of light, with the light outside, inside, far away, or close to a ray.
     position = PLACES[place]
     distance = max(1.0, abs(position[2]))
     lamp = {"point": {"position": position, "intensity": 10 * distance**2}}
@@ -228,7 +171,8 @@ def light(
 
 
 def several(rig: Rig, alpha: float, tracker: str, shadow: str) -> None:
-    """A cloud that scatters more than once, against delta tracking."""
+    """Beyond one scattering there is no reference: trackers are held against each other."""
+    # A cloud that scatters more than once, against delta tracking.
     near = tracker in NEAR_TRACKERS
     # weights of a sampler of light multiply: after eight scatterings only their tail counts
     medium = {"cloud": CLOUD | {"sigma_t": 3 if near else 10, "albedo": 0.9, "g": 0.4}}
@@ -241,7 +185,9 @@ def several(rig: Rig, alpha: float, tracker: str, shadow: str) -> None:
 
 
 def phase_function(rig: Rig, alpha: float, g: float) -> None:
-    """Cosines as they are drawn against the cumulated density, and the density against its form."""
+    """A phase function that is not sampled as it is evaluated brings light that is not there; near
+    0 and 1 its closed form divides 0 by 0."""
+    # Cosines as they are drawn against the cumulated density, and the density against its form.
     code = kernel_files.read("phase/henyey_greenstein").code
     code = code.replace("scene->optics.g", f"((SCALAR){g!r})")
     lanes = Lanes(rig, 16, more=f"typedef int Scene;\n{code}")
@@ -280,3 +226,34 @@ def rod_model(albedo: float, depth: float) -> tuple[float, float]:
     r = (1 - k) / (1 + k)
     damped = 1 - r**2 * np.exp(-2 * k * depth)
     return (1 - r**2) * np.exp(-k * depth) / damped, r * (1 - np.exp(-2 * k * depth)) / damped
+
+
+def _one(name: str, tracker: str, situation: Any, **options: Any) -> None:
+    checks.one(f"{GROUP}/{name}", tracker, **options)(situation)
+
+
+for (phase, g), depth in itertools.product(PHASES.items(), (1, 10, 100)):
+    for kind in ("homogeneous", "grid"):
+        name, keys = f"furnace/{kind}-tau-{depth}-{phase}/delta", {"sigma_t": depth, "g": g}
+        _one(name, "delta", furnace, kind=kind, **keys)
+for kind in ("grid", "stretched"):
+    _one(f"furnace/{kind}/regular", "regular", furnace, kind=kind, sigma_t=30, g=0.9)
+for tracker, shadow in (*TOGETHER, *((name, "ratio") for name in NEAR_TRACKERS)):
+    _one(f"several/{shadow}/{tracker}", tracker, several, shadow=shadow)
+for tracker in EMITTED:
+    _one(f"emission/{tracker}", tracker, emission)
+for albedo, depth in itertools.product((0.3, 0.9), (0.5, 2.0, 8.0)):
+    keys = {"albedo": albedo, "depth": depth}
+    _one(f"rod/albedo-{albedo}-tau-{depth}/delta", "delta", rod, **keys)
+for sigma_t, g in itertools.product((0.1, 3.0, 30.0), (0.0, 0.7)):
+    _one(f"length/tau-{sigma_t}-g-{g}/delta", "delta", length, sigma_t=sigma_t, g=g)
+for kind, pairs in ((single, SHADOWS), (voxels, SHARING)):
+    for (tracker, shadow), g in itertools.product(pairs, (0.0, 0.6)):
+        name = f"{kind.__name__}/{shadow}-g-{g}/{tracker}"
+        _one(name, tracker, kind, shadow=shadow, g=g)
+for (name, sampler), place in itertools.product(NEAR.items(), PLACES):
+    (tracker,) = sampler
+    full = f"light/{place}/{name}" if name == tracker else f"light/{place}/{name}/{tracker}"
+    _one(full, tracker, light, sampler=sampler, place=place)
+for name, g in ANISOTROPIES.items():
+    _one(f"phase/g-{name}", "", phase_function, g=g)

@@ -2,45 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
-from freepath.catalog import Catalog, Tracker
+from freepath.catalog import Tracker
 from freepath.check.identities import check_clean
-from freepath.check.model import TINY, Check, of_tracker
+from freepath.check.model import TINY
 from freepath.check.rig import Rig
-from freepath.check.suite.common import FEW, UPWARD, everyone, fly, knows_depth
+from freepath.check.suite.common import FEW, UPWARD, Checks, everyone, fly, knows_depth
 from freepath.check.verdict import demand
 
 SAMPLES = 4
 SCATTERING = ("delta", "combined", "equiangular", "joint", "regular", "spectral", "tabulated")
 
 
-def checks(catalog: Catalog) -> Iterator[Check]:
-    """One of each tracker."""
-    for tracker in catalog.trackers.values():
-        if everyone(tracker):
-            yield Check(
-                f"smoke/{tracker.name}",
-                ("fast", "smoke", TINY, tracker.name),
-                "A read beyond an array or of what nobody has written gives right answers until it "
-                "does not: an interpreter must have no complaint, and paths must end on their ray.",
-                of_tracker(tracker, few_paths),
-                kernels=f"smoke/{tracker.name}",
-            )
-        if tracker.name in SCATTERING:
-            yield Check(
-                f"smoke/scattering/{tracker.name}",
-                ("fast", "smoke", TINY, "scattering", tracker.name),
-                "Paths that scatter copy rays, weights and states of lanes that are not there: an "
-                "interpreter must have no complaint, and what is brought be a number above 0.",
-                of_tracker(tracker, few_scatterings),
-                kernels=f"smoke/scattering/{tracker.name}",
-            )
+SMOKE = ("fast", "smoke", TINY)
+checks = Checks()
 
 
+@checks.each("smoke", everyone, SMOKE)
 def few_paths(rig: Rig, alpha: float, tracker: Tracker) -> None:
-    """Sixteen rays, four samples of each, one lane."""
+    """A read beyond an array or of what nobody has written gives right answers until it does not:
+    an interpreter must have no complaint, and paths must end on their ray."""
     medium = "exponential" if knows_depth(tracker) else "trilinear"
     flight = fly(rig, tracker, medium, rays=FEW, lanes=1)
     samples = flight.record(SAMPLES)
@@ -51,8 +32,10 @@ def few_paths(rig: Rig, alpha: float, tracker: Tracker) -> None:
     demand(not beyond.any() and (samples.t >= 0.0).all(), "a path ends beyond its ray")
 
 
+@checks.each("smoke/scattering", lambda t: t.name in SCATTERING, (*SMOKE, "scattering"))
 def few_scatterings(rig: Rig, alpha: float, tracker: Tracker) -> None:
-    """The same, scattered twice in the light of a point."""
+    """Paths that scatter copy rays, weights and states of lanes that are not there: an interpreter
+    must have no complaint, and what is brought be a number above 0."""
     channels = {"channels": [1, 0.5]} if tracker.name == "spectral" else {}
     medium = {"cloud": {"resolution": 8, "sigma_t": 4, "albedo": 0.9, "g": 0.3} | channels}
     light = {"point": {"position": [0.3, 0.4, 2.0], "intensity": 10}}

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 from freepath import kernel_files
-from freepath.catalog import Catalog, Tracker
+from freepath.catalog import Tracker
 from freepath.check.cases import check_samples
-from freepath.check.model import Check
 from freepath.check.parts import Lanes
 from freepath.check.rig import Rig
-from freepath.check.suite.common import VOXELS, everyone, hard, knows_depth, voxels
+from freepath.check.suite.common import VOXELS, Checks, everyone, knows_depth, voxels
 from freepath.check.suite.geometry import contrast
 from freepath.check.verdict import demand
 
-GROUP = "contrast"
 LARGEST, SMALLEST = 65504.0, 2.0**-24
 INFINITE = 0x7C00
 """The bits of infinity: those of every positive finite half are below."""
@@ -23,33 +19,7 @@ DEEP = 2.0**20
 """Of a cube whose voxels have optical depths of some sixteenths, all are denormal halves."""
 
 
-def checks(catalog: Catalog) -> Iterator[Check]:
-    """Of the group contrast: those of half storage."""
-    for lanes in (1, 16):
-        yield _values(lanes)
-    yield from hard(
-        catalog,
-        (GROUP, "half-million", contrast),
-        in_voxels,
-        "Neighbours of 0, of the largest and of the smallest half are halves exactly: rays through "
-        "one must not see the other, and none is infinite.",
-        ends=(LARGEST, SMALLEST),
-        storage="half",
-    )
-    yield from hard(
-        catalog,
-        (GROUP, "half-denormal", denormal),
-        in_voxels,
-        "Densities that are denormal halves are ordinary numbers once they are read: flushed to 0 "
-        "a thin and large medium vanishes.",
-    )
-    yield from hard(
-        catalog,
-        (GROUP, "half-rounded", rounded),
-        in_voxels,
-        "A density that is rounded up is above a majorant or control of the density as it was: "
-        "these must be of what is stored, and the mean that of the rounded medium.",
-    )
+checks = Checks()
 
 
 def in_voxels(tracker: Tracker) -> bool:
@@ -57,22 +27,9 @@ def in_voxels(tracker: Tracker) -> bool:
     return everyone(tracker) and not knows_depth(tracker)
 
 
-def _values(lanes: int) -> Check:
-    def run(rig: Rig, alpha: float) -> None:
-        every_value(rig, lanes)
-
-    return Check(
-        f"hard/{GROUP}/half-values/{lanes}-lanes",
-        ("fast", "hard", GROUP),
-        "A conversion of one's own loses the denormal halves, or the largest: all that are finite "
-        "must be read as the same float.",
-        run,
-        kernels=GROUP,
-    )
-
-
-def every_value(rig: Rig, lanes: int) -> None:
-    """In a buffer, as voxels are."""
+def every_value(rig: Rig, alpha: float, lanes: int) -> None:
+    """A conversion of one's own loses the denormal halves, or the largest: all that are finite must
+    be read as the same float."""
     bits = np.arange(INFINITE, dtype=np.uint16)
     part = Lanes(rig, lanes, more=kernel_files.read("storage/half").code)
     body = "out0 = gather_half((__global const half *)in0_, as_index(in1));"
@@ -84,8 +41,11 @@ def every_value(rig: Rig, lanes: int) -> None:
     demand(not wrong.size, f"{wrong.size} of {len(bits)} halves are read wrong, first {first}")
 
 
+@checks.hard("contrast/half-denormal", in_voxels)
 def denormal(rig: Rig, alpha: float, tracker: Tracker) -> None:
-    """Multiples of the smallest half: nothing is rounded, so the mean is that of float."""
+    """Densities that are denormal halves are ordinary numbers once they are read: flushed to 0 a
+    thin and large medium vanishes."""
+    # Multiples of the smallest half: nothing is rounded, so the mean is that of float.
     steps = np.ceil(16.0 * VOXELS)
     flight = voxels(rig, tracker, steps / 16.0, DEEP, storage="half")
     read = flight.stored.bounds((1, 1, 1))[1].max()
@@ -95,14 +55,25 @@ def denormal(rig: Rig, alpha: float, tracker: Tracker) -> None:
     check_samples(flight, flight.record(2048), alpha)
 
 
-_CENTRES = np.stack(np.meshgrid(*[np.arange(len(VOXELS)) + 0.5] * 3), axis=-1).reshape(-1, 3)
+_CENTRES = np.argwhere(VOXELS >= 0.0)[:, ::-1] + 0.5
 
 
+@checks.hard("contrast/half-rounded", in_voxels)
 def rounded(rig: Rig, alpha: float, tracker: Tracker) -> None:
-    """Densities of which half are rounded up, beside empty ones, and each cell's own majorant."""
+    """A density that is rounded up is above a majorant or control of the density as it was: these
+    must be of what is stored, and the mean that of the rounded medium."""
+    # Densities of which half are rounded up, beside empty ones, and each cell's own majorant.
     axes = {"storage": "half", "interpolation": "nearest"}
     flight = voxels(rig, tracker, VOXELS, **axes)
     upward = flight.stored.sigma_t(_CENTRES) - flight.medium.sigma_t(_CENTRES)
     demand((upward > 0.0).any() and (upward < 0.0).any(), "no density is rounded either way")
     flight = flight.as_stored()
     check_samples(flight, flight.record(2048), alpha)
+
+
+HALVES = """Neighbours of 0, of the largest and of the smallest half are halves exactly: rays
+through one must not see the other, and none is infinite."""
+ENDS = {"ends": (LARGEST, SMALLEST), "storage": "half"}
+checks.hard("contrast/half-million", in_voxels, sentence=HALVES, **ENDS)(contrast)
+for lanes in (1, 16):
+    checks.one(f"contrast/half-values/{lanes}-lanes", lanes=lanes)(every_value)

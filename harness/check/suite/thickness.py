@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
-from freepath.catalog import Catalog, Tracker
+from freepath.catalog import Tracker
 from freepath.check.cases import check_samples
 from freepath.check.identities import check_clean
-from freepath.check.model import Check, needs_double
+from freepath.check.model import needs_double
 from freepath.check.rig import Rig
 from freepath.check.suite.common import (
     UPWARD,
     VOXELS,
+    Checks,
     everyone,
-    hard,
     has_free_path,
     homogeneous,
     splits_off,
@@ -35,53 +33,13 @@ THICK = {"tau-50": 50.0, "tau-1e3": 1e3, "tau-1e6": 1e6}
 THIN = {"tau-1e-7": 1e-7, "tau-1e-12": 1e-12}
 
 
-def checks(catalog: Catalog) -> Iterator[Check]:
-    """The groups thin and thick."""
-    for name, depth in THIN.items():
-        yield from hard(
-            catalog,
-            ("thin", name, thin),
-            everyone,
-            "Where next to nothing is taken, an epsilon that clamps a logarithm or a density takes "
-            "far more: what is taken must be right to the grain of uniform numbers and floats.",
-            depth=depth,
-        )
-        yield from hard(
-            catalog,
-            ("thin", f"relative-{name}", relative),
-            lambda t: t.name in ONLY_WEIGHS and t.name != "next_flight_ratio",
-            "T of a thin medium is right whatever one computes; the relative error of 1 - T is "
-            "not, if weights are made of products of rounded reciprocals.",
-            depth=depth,
-            applies=needs_double,
-            speed="slow",
-        )
-    yield from hard(
-        catalog,
-        ("thin", "huge-extent", huge),
-        everyone,
-        "An atmosphere of tiny density and huge extent is lost to any absolute cut-off of "
-        "densities or distances.",
-    )
-    for name, depth in THICK.items():
-        yield from hard(
-            catalog,
-            ("thick", name, thick),
-            lambda t: t.estimands[0] == "transmittance",
-            "T underflows, and a product of transmittances over densities is 0 / 0 beyond 87 mean "
-            "free paths: it must become 0, weights must stay in [0, 1], and cost bounded.",
-            depth=depth,
-        )
-    yield from hard(
-        catalog,
-        ("thick", "free-path", short_paths),
-        lambda t: has_free_path(t) and t.name not in SCORES_ON_ITS_WAY,
-        "Free paths of a millionth of the ray are lost if distances are summed over what is left.",
-    )
+checks = Checks()
 
 
 def thin(rig: Rig, alpha: float, tracker: Tracker, depth: float) -> None:
-    """To the grain of the numbers: 2^-24 for each draw or rounding."""
+    """Where next to nothing is taken, an epsilon that clamps a logarithm or a density takes far
+    more: what is taken must be right to the grain of uniform numbers and floats."""
+    # To the grain of the numbers: 2^-24 for each draw or rounding.
     flight = homogeneous(rig, tracker, depth, rays=UPWARD, estimand=tracker.estimands[0])
     samples = flight.record(4096)
     check_clean(samples.round, bounded=True)
@@ -95,7 +53,9 @@ def thin(rig: Rig, alpha: float, tracker: Tracker, depth: float) -> None:
 
 
 def relative(rig: Rig, alpha: float, tracker: Tracker, depth: float) -> None:
-    """In double precision, with majorants so loose that there is a collision to weigh."""
+    """T of a thin medium is right whatever one computes; the relative error of 1 - T is not, if
+    weights are made of products of rounded reciprocals."""
+    # In double precision, with majorants so loose that there is a collision to weigh.
     axes = {"arithmetic": "double", "lanes": 4, "rays": UPWARD, "tightness": 1.0 / depth}
     flight = homogeneous(rig, tracker, depth, **axes)
     moments = flight.record(4096).round.moments
@@ -109,14 +69,19 @@ def relative(rig: Rig, alpha: float, tracker: Tracker, depth: float) -> None:
     demand(abs(taken - expected) <= allowed, text)
 
 
+@checks.hard("thin/huge-extent", everyone)
 def huge(rig: Rig, alpha: float, tracker: Tracker) -> None:
-    """1e-12 a length unit, over 1e12 of them."""
+    """An atmosphere of tiny density and huge extent is lost to any absolute cut-off of densities or
+    distances."""
+    # 1e-12 a length unit, over 1e12 of them.
     flight = voxels(rig, tracker, VOXELS, 1e12, seed=rig.seed + 3)
     check_samples(flight, flight.record(512), alpha)
 
 
 def thick(rig: Rig, alpha: float, tracker: Tracker, depth: float) -> None:
-    """Nothing comes through, and nothing becomes infinite or no number."""
+    """T underflows, and a product of transmittances over densities is 0 / 0 beyond 87 mean free
+    paths: it must become 0, weights must stay in [0, 1], and cost bounded."""
+    # Nothing comes through, and nothing becomes infinite or no number.
     rays = UPWARD if depth < 1e5 else {"orthographic": {"resolution": 1}}
     # blocks of one sample: those of a block would follow each other in one lane
     flight = homogeneous(rig, tracker, depth, rays=rays)
@@ -141,8 +106,10 @@ def thick(rig: Rig, alpha: float, tracker: Tracker, depth: float) -> None:
         demand(lookups <= 8.0 * depth + 1e5, f"{lookups:.3g} lookups for a path")
 
 
+@checks.hard("thick/free-path", lambda t: has_free_path(t) and t.name not in SCORES_ON_ITS_WAY)
 def short_paths(rig: Rig, alpha: float, tracker: Tracker) -> None:
-    """The distribution of free paths in an optical depth of a million."""
+    """Free paths of a millionth of the ray are lost if distances are summed over what is left."""
+    # The distribution of free paths in an optical depth of a million.
     axes = {"estimand": "free_path", "rays": UPWARD}
     if not tracker.unbiased:
         axes["parameters"] = {"step": 1e-4}
@@ -150,3 +117,16 @@ def short_paths(rig: Rig, alpha: float, tracker: Tracker) -> None:
     samples = flight.record(1024)
     check_samples(flight, samples, alpha)
     demand(not samples.escaped.any(), "a path through an optical depth of a million")
+
+
+for name, depth in THIN.items():
+    checks.hard(f"thin/{name}", everyone, depth=depth)(thin)
+    checks.hard(
+        f"thin/relative-{name}",
+        lambda t: t.name in ONLY_WEIGHS and t.name != "next_flight_ratio",
+        depth=depth,
+        applies=needs_double,
+        speed="slow",
+    )(relative)
+for name, depth in THICK.items():
+    checks.hard(f"thick/{name}", lambda t: t.estimands[0] == "transmittance", depth=depth)(thick)
