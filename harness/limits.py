@@ -8,15 +8,44 @@ together, some work-item was stopped before, and what it worked on is lost.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from freepath.device import DeviceInfo
-from freepath.errors import DriverLimitError
+from freepath.errors import DriverLimitError, UsageError
+from freepath.scene import Medium
 
 INTERPRETED_RAYS, INTERPRETED_SAMPLES = 16, 4
 """The most rays, and samples of each, that a device gets which interprets kernels to check them."""
 SAMPLES_OF_A_UNIT = 1
 """No more on a device that limits loops: a lane works on a unit at least, and eight samples of
 unbiased ray marching were too many for llvmpipe."""
+
+UNITS, SQUARED = (1e-30, 1e30), (1e-15, 1e15)
+"""What lengths and extinctions may be that kernels count in float32, and where these are scores or
+are squared; docs/notation.md derives it."""
+
+
+def check_units(case: Any, medium: Medium) -> None:
+    """Refuse a scene in units in which float32 cannot hold its lengths and extinctions.
+
+    The box's diagonal, and the largest extinction in any channel times tightness, or 0.
+    """
+    length = float(np.linalg.norm(np.ptp(medium.world_box(), axis=0)))
+    largest = float(medium.bounds((1, 1, 1))[1].max() * medium.channels.max()) * case.tightness
+    near = any(getattr(case.light, "intensity", ()))
+    lengths = SQUARED if near or case.estimand in ("free_path", "path_length") else UNITS
+    extinctions = SQUARED if case.estimand == "mean_extinction" else UNITS
+    for what, value, (low, high) in (
+        ("the diagonal of its box", length, lengths),
+        ("its largest majorant", largest, extinctions),
+        ("the optical depth of its box", largest * length, (0.0, UNITS[1])),
+    ):
+        if not (low <= value <= high or (value == 0 and what != "the diagonal of its box")):
+            raise UsageError(
+                f"{case.name}: {what} is {value:.4g}, expected {low:g} to {high:g}, which float32 "
+                "holds: choose another unit of length"
+            )
 
 
 def rays_of(segments: np.ndarray, info: DeviceInfo) -> np.ndarray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import datetime
+import math
 import os
 import re
 import time
@@ -12,12 +13,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from freepath import environment
+from freepath import environment, limits, majorants
 from freepath.binding import Scene
 from freepath.catalog import Catalog
 from freepath.config import Config
 from freepath.device import Device
-from freepath.errors import FreepathError
+from freepath.errors import FreepathError, UsageError
 from freepath.pictures import are_there
 from freepath.plan import Case
 from freepath.results import SCHEMA_VERSION, ResultFolder, key_of
@@ -67,17 +68,40 @@ def build_scenes(cases: list[Case], folders: list[Path]) -> dict[str, Scene]:
     scenes: dict[str, Scene] = {}
     for case in cases:
         key = scene_key(case)
+        # what cannot be used is told before anything runs
+        _check_memory(case)
         if key not in scenes:
             scenes[key] = Scene.of(case, build_medium(case.medium, folders), folders)
-        # what cannot be used is told before anything runs
+        limits.check_units(case, scenes[key].medium)
         scenes[key].sky(case)
         scenes[key].as_stored(case)
     return scenes
 
 
+def _check_memory(case: Case) -> None:
+    """Refuse a majorant whose cells do not fit into what memory is left."""
+    if case.majorant is None:
+        return
+    cells = math.prod(majorants.cells_of(case.majorant))
+    needed, left = cells * majorants.BYTES_PER_CELL, environment.memory_left()
+    if needed > left:
+        sizes = f"{needed / 2**30:.3g} GiB, {left / 2**30:.3g} are left"
+        raise UsageError(f"{case.name}: its majorant of {cells} cells takes {sizes}")
+
+
 def scene_key(case: Case) -> str:
     """What cases of the same scene have in common; all cases of a config fly the same rays."""
     return str(case.medium.as_dict())
+
+
+def _inputs(cases: list[Case], scenes: dict[str, Scene]) -> list[str]:
+    """What is used of each file: of a volume its grid, of an image its channels."""
+    told: dict[str, None] = {}
+    for case in cases:
+        scene = scenes[scene_key(case)]
+        for one in (scene.medium, scene.sky(case)):
+            told |= {one.told: None} if one is not None and one.told else {}
+    return list(told)
 
 
 def new_folder(name: str) -> Path:
@@ -130,7 +154,7 @@ class Run:
         if not self.total:
             self.folder.close()
             return
-        facts = self._describe(devices, jobs)
+        facts = self._describe(devices, jobs) | {"inputs": _inputs(self.cases, scenes)}
         session = self._session(devices)
         ended = "failed"
         try:
