@@ -21,27 +21,27 @@ SAMPLES_OF_A_UNIT = 1
 """No more on a device that limits loops: a lane works on a unit at least, and eight samples of
 unbiased ray marching were too many for llvmpipe."""
 
-UNITS, SQUARED = (1e-30, 1e30), (1e-15, 1e15)
-"""What lengths and extinctions may be that kernels count in float32, and where these are scores or
-are squared; docs/notation.md derives it."""
+LENGTHS, EXTINCTIONS, SQUARED = (1e-30, 1e22), (1e-30, 1e30), (1e-15, 1e15)
+"""What kernels count in float32, and what they count whose squares they count as well;
+docs/notation.md derives it."""
 
 
-def check_units(case: Any, medium: Medium) -> None:
+def check_units(case: Any, medium: Medium, largest: float) -> None:
     """Refuse a scene in units in which float32 cannot hold its lengths and extinctions.
 
-    The box's diagonal, and the largest extinction in any channel times tightness, or 0.
+    `largest` is the medium's largest sigma_t.
     """
     length = float(np.linalg.norm(np.ptp(medium.world_box(), axis=0)))
-    largest = float(medium.bounds((1, 1, 1))[1].max() * medium.channels.max()) * case.tightness
+    majorant = largest * float(medium.channels.max()) * (case.tightness or 1.0)
     near = any(getattr(case.light, "intensity", ()))
-    lengths = SQUARED if near or case.estimand in ("free_path", "path_length") else UNITS
-    extinctions = SQUARED if case.estimand == "mean_extinction" else UNITS
+    lengths = SQUARED if near or case.estimand in ("free_path", "path_length") else LENGTHS
+    extinctions = SQUARED if case.estimand == "mean_extinction" else EXTINCTIONS
     for what, value, (low, high) in (
         ("the diagonal of its box", length, lengths),
-        ("its largest majorant", largest, extinctions),
-        ("the optical depth of its box", largest * length, (0.0, UNITS[1])),
+        ("its largest majorant", majorant or extinctions[0], extinctions),
+        ("the optical depth of its box", majorant * length, (0.0, LENGTHS[1])),
     ):
-        if not (low <= value <= high or (value == 0 and what != "the diagonal of its box")):
+        if not low <= value <= high:
             raise UsageError(
                 f"{case.name}: {what} is {value:.4g}, expected {low:g} to {high:g}, which float32 "
                 "holds: choose another unit of length"

@@ -72,7 +72,8 @@ def build_scenes(cases: list[Case], folders: list[Path]) -> dict[str, Scene]:
         _check_memory(case)
         if key not in scenes:
             scenes[key] = Scene.of(case, build_medium(case.medium, folders), folders)
-        limits.check_units(case, scenes[key].medium)
+        scene = scenes[key]
+        limits.check_units(case, scene.medium, float(scene.bounds((1, 1, 1))[1].max()))
         scenes[key].sky(case)
         scenes[key].as_stored(case)
     return scenes

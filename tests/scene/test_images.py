@@ -163,15 +163,18 @@ def test_windows_far_apart_claim_no_memory(tmp_path):
         read_volume(tmp_path / "v.exr")
 
 
-def test_an_attribute_that_is_no_text(tmp_path):
+def test_a_header_that_is_no_text(tmp_path):
     path = tmp_path / "v.exr"
-    attributes = [("note", "string", "something")]
-    write_slices(path, DENSITIES.astype(np.float32), attributes)
+    write_slices(path, DENSITIES.astype(np.float32))
     content = path.read_bytes()
-    for place in (content.index(b"something"), content.index(b"note")):
-        path.write_bytes(content[:place] + b"\xff" + content[place + 1 :])
-        with pytest.raises(VolumeError, match="is damaged, its header has text that is no UTF-8"):
+    told = []
+    for place in range(8, 300):
+        path.write_bytes(content[:place] + bytes([content[place] | 0x80]) + content[place + 1 :])
+        try:
             read_volume(path)
+        except VolumeError as error:
+            told.append(str(error))
+    assert f"{path}: is damaged, its header has text that is no UTF-8" in told
 
 
 def tiff(path, pages, bits, photometric=1, description=b"", order="<", **more):
