@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import mmap
 import re
@@ -139,7 +140,7 @@ def _read_tiff(path: Path) -> NDArray:
 
     _check_pages(path)
     try:
-        with tifffile.TiffFile(path) as file:
+        with _no_error_logged("tifffile"), tifffile.TiffFile(path) as file:
             pages = list(file.pages)
             for number, page in enumerate(pages):
                 _check_page(path, number, page, pages[0])
@@ -158,6 +159,24 @@ def _read_tiff(path: Path) -> NDArray:
         found = f"its description promises {promised} slices, {len(slices)} are there"
         raise VolumeError(f"{path}: {found}")
     return slices
+
+
+@contextmanager
+def _no_error_logged(name: str) -> Iterator[None]:
+    """Raise what a library logs as an error: tifffile goes on without a tag that it cannot read."""
+    logged: list[str] = []
+    handler = logging.Handler(logging.WARNING)  # warnings are kept from the screen
+    handler.emit = lambda record: logged.extend(
+        [record.getMessage()] * (record.levelno >= logging.ERROR)
+    )
+    logger = logging.getLogger(name)
+    logger.addHandler(handler)
+    try:
+        yield
+    finally:
+        logger.removeHandler(handler)
+    if logged:
+        raise ValueError(logged[0])
 
 
 def _check_page(path: Path, number: int, page: Any, first: Any) -> None:

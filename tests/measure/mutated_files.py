@@ -12,6 +12,7 @@ if anything else happened.
 
 import argparse
 import csv
+import importlib
 import io
 import os
 import random
@@ -252,6 +253,17 @@ def main():
     parser.add_argument("-f", nargs="*", default=list(FORMATS), choices=FORMATS)
     parser.add_argument("--keep", type=Path, help="a folder for the files that failed")
     options = parser.parse_args()
+    for module in (
+        "config",
+        "catalog",
+        "scene.volumes",
+        "scene.images",
+        "scene.openvdb",
+        "scene.sky",
+    ):
+        importlib.import_module(f"freepath.{module}")  # once, and not in each process
+    for module in ("OpenImageIO", "tifffile", "imagecodecs", "freepath.scene.ray_files"):
+        importlib.import_module(module)
     failed = 0
     with tempfile.TemporaryDirectory() as folder:
         for name in options.f:

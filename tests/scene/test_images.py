@@ -266,6 +266,17 @@ def test_damaged_tiff_files(tmp_path, change, message):
         read_volume(tmp_path / "v.tif")
 
 
+def test_a_tag_that_cannot_be_read_is_not_left_out(tmp_path, capsys):
+    path = tmp_path / "v.tif"
+    tiff(path, np.ones((2, 4, 8), int), 8)
+    content = path.read_bytes()
+    tag = struct.pack("<HHI", 258, 4, 1)  # of 8 bits; without it there would be 1
+    path.write_bytes(content.replace(tag, struct.pack("<HHI", 258, 4, 2**20)))
+    with pytest.raises(VolumeError, match="cannot be read: .*TiffTag 258 .* invalid value offset"):
+        read_volume(path)
+    assert capsys.readouterr().err == ""
+
+
 def test_pages_in_a_circle(tmp_path):
     path = tmp_path / "v.tif"
     tiff(path, np.ones((2, 4, 8), int), 8)
