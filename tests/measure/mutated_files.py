@@ -12,6 +12,7 @@ if anything else happened.
 
 import argparse
 import csv
+import functools
 import importlib
 import io
 import os
@@ -133,10 +134,22 @@ def read_rays(path):
     return np.concatenate(read_rays(path), axis=1)
 
 
-def read_config(path):
-    from freepath import catalog, config
+@functools.cache
+def trackers():
+    from freepath import catalog
 
-    config.load(path, catalog.load([]).parameter_models())
+    return catalog.load([]).parameter_models()
+
+
+def read_config(path):
+    from freepath import config
+
+    config.load(path, trackers())
+
+
+def write_config(path):
+    path.write_text(CONFIG)
+    trackers()  # once, and not in each process
 
 
 def npy_again(path):
@@ -175,7 +188,7 @@ FORMATS = {
     "vdb": (".vdb", write_vdb, read_volume, None),
     "sky": (".exr", write_sky, read_sky, None),
     "rays": (".csv", write_rays, read_rays, None),
-    "config": (".yaml", lambda path: path.write_text(CONFIG), read_config, None),
+    "config": (".yaml", write_config, read_config, None),
 }
 
 
