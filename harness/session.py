@@ -102,7 +102,8 @@ def _inputs(cases: list[Case], scenes: dict[str, Scene]) -> list[str]:
         scene = scenes[scene_key(case)]
         for one in (scene.medium, scene.sky(case)):
             told |= {one.told: None} if one is not None and one.told else {}
-    return list(told)
+    # names of files, grids and channels may hold what moves a terminal's cursor
+    return ["".join(c if c.isprintable() else "?" for c in one) for one in told]
 
 
 def new_folder(name: str) -> Path:
