@@ -66,7 +66,8 @@ def choose(path: Path, grids: list[Entry], wanted: str | None) -> Entry:
     if wanted is None:
         named = [grid for grid in grids if grid.name == "density"] or scalars
         if not scalars:
-            raise VolumeError(f"{path}: it holds no grid of scalars: {_listed(grids)}")
+            all_of_them = ", ".join(map(str, grids)) or "it is empty"
+            raise VolumeError(f"{path}: it holds no grid of scalars: {all_of_them}")
     if len(named) > 1:
         raise VolumeError(f"{path}: it holds several grids, choose one of: {listed}")
     if not named or named[0].kind not in SCALARS:
@@ -74,10 +75,6 @@ def choose(path: Path, grids: list[Entry], wanted: str | None) -> Entry:
         what = what or f"there is no grid {wanted!r} of scalars"
         raise VolumeError(f"{path}: {what}, expected one of: {listed}")
     return named[0]
-
-
-def _listed(grids: list[Entry]) -> str:
-    return ", ".join(map(str, grids)) or "it is empty"
 
 
 def _entries(file: BinaryIO, path: Path) -> list[Entry] | None:
