@@ -7,7 +7,7 @@ import os
 import signal
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any
 
 import shtab
@@ -59,6 +59,8 @@ examples:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; returns its exit code. A user's mistake is a message, never a traceback."""
+    if hasattr(sys.stdout, "reconfigure"):  # of a terminal without a plus-minus
+        sys.stdout.reconfigure(errors="backslashreplace")
     options = parser().parse_args(arguments)
     command = COMMANDS[options.command].execute
     try:
@@ -76,9 +78,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print("freepath: out of memory", file=sys.stderr)
         return FAILED
     except BrokenPipeError:
-        # The reader of a pipe has seen enough; Python must not complain when it flushes at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _let_go_of_output()  # the reader of a pipe has seen enough
         return 0
+    except OSError as error:  # a full disk, of which standard output may be one
+        _let_go_of_output()
+        print(f"freepath: {error.filename or 'writing'}: {error.strerror}", file=sys.stderr)
+        return FAILED
+
+
+def _let_go_of_output() -> None:
+    """Keep Python from complaining when it flushes at exit."""
+    with suppress(OSError, ValueError):
+        sys.stdout.flush()
+    with suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def parser() -> argparse.ArgumentParser:

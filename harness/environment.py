@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import platform
 from importlib import metadata
+from pathlib import Path
 from typing import Any
 
 import psutil
 from freepath.version import __version__
 
-PACKAGES = ("numpy", "scipy", "pyopencl", "OpenImageIO", "pocl-binary-distribution")
+PACKAGES = ("numpy", "scipy", "pyopencl", "OpenImageIO", "tifffile", "pocl-binary-distribution")
 VARIABLES = ("POCL_", "OCL_", "OPENCL_", "RUSTICL_", "PYOPENCL_", "CL_")
 
 
@@ -29,6 +31,17 @@ def processor() -> str:
 def load() -> float:
     """Runnable processes, averaged over a minute; above the number of cores timings suffer."""
     return round(psutil.getloadavg()[0], 2)
+
+
+def memory_left() -> int:
+    """Bytes that this process may still take, of the machine and of its control group."""
+    left = [psutil.virtual_memory().available]
+    with contextlib.suppress(OSError, ValueError):  # "max" is no number
+        most, taken = (
+            int(Path(f"/sys/fs/cgroup/memory.{name}").read_text()) for name in ("max", "current")
+        )
+        left.append(most - taken)
+    return min(left)
 
 
 def _version(package: str) -> str | None:

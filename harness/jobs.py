@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from freepath import majorants, source
+from freepath import environment, limits, majorants, source
 from freepath.binding import Scene, structure_of
 from freepath.catalog import Catalog, Tracker
 from freepath.device import Device
+from freepath.errors import UsageError
 from freepath.measure import Bench
 from freepath.plan import Case
 from freepath.results import key_of
@@ -28,13 +30,36 @@ def scenes_of(cases: Iterable[Case], folders: Iterable[Path]) -> dict[Case, Scen
     found = {}
     for case in cases:
         key = str(case.medium.as_dict())
+        # what cannot be used is reported before anything runs
+        _check_memory(case)
         if key not in scenes:
             scenes[key] = Scene.of(case, build_medium(case.medium, folders), folders)
-        # what cannot be used is reported before anything runs
+        limits.check_units(case, scenes[key].medium, float(scenes[key].bounds((1, 1, 1))[1].max()))
         scenes[key].sky(case)
         scenes[key].as_stored(case)
         found[case] = scenes[key]
     return found
+
+
+def _check_memory(case: Case) -> None:
+    """Refuse a majorant whose cells do not fit into what memory is left."""
+    if case.majorant is None:
+        return
+    cells = math.prod(majorants.cells_of(case.majorant))
+    needed, left = cells * majorants.BYTES_PER_CELL, environment.memory_left()
+    if needed > left:
+        sizes = f"{needed / 2**30:.3g} GiB, {left / 2**30:.3g} are left"
+        raise UsageError(f"{case.name}: its majorant of {cells} cells takes {sizes}")
+
+
+def inputs_of(scenes: dict[Case, Scene]) -> list[str]:
+    """What is used of each file: of a volume its grid, of an image its channels."""
+    used: dict[str, None] = {}
+    for case, scene in scenes.items():
+        for one in (scene.medium, scene.sky(case)):
+            used |= {one.told: None} if one is not None and one.told else {}
+    # names of files, grids and channels may hold what moves a terminal's cursor
+    return ["".join(c if c.isprintable() else "?" for c in one) for one in used]
 
 
 @dataclass(eq=False)

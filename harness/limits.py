@@ -8,15 +8,44 @@ together, some work-item was stopped before, and what it worked on is lost.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from freepath.device import DeviceInfo
-from freepath.errors import DriverLimitError
+from freepath.errors import DriverLimitError, UsageError
+from freepath.scene import Medium
 
 INTERPRETED_RAYS, INTERPRETED_SAMPLES = 16, 4
 """The most rays, and samples of each, that a device gets which interprets kernels to check them."""
 SAMPLES_OF_A_UNIT = 1
 """No more on a device that limits loops: a lane works on a unit at least, and eight samples of
 unbiased ray marching were too many for llvmpipe."""
+
+LENGTHS, EXTINCTIONS, SQUARED = (1e-30, 1e22), (1e-30, 1e30), (1e-15, 1e15)
+"""What kernels count in float32, and what they count whose squares they count as well;
+docs/notation.md derives it."""
+
+
+def check_units(case: Any, medium: Medium, largest: float) -> None:
+    """Refuse a scene in units in which float32 cannot hold its lengths and extinctions.
+
+    `largest` is the medium's largest sigma_t.
+    """
+    length = float(np.linalg.norm(np.ptp(medium.world_box(), axis=0)))
+    majorant = largest * float(medium.channels.max()) * (case.tightness or 1.0)
+    near = any(getattr(case.light, "intensity", ()))
+    lengths = SQUARED if near or case.estimand in ("free_path", "path_length") else LENGTHS
+    extinctions = SQUARED if case.estimand == "mean_extinction" else EXTINCTIONS
+    for what, value, (low, high) in (
+        ("the diagonal of its box", length, lengths),
+        ("its largest majorant", majorant or extinctions[0], extinctions),
+        ("the optical depth of its box", majorant * length, (0.0, LENGTHS[1])),
+    ):
+        if not low <= value <= high:
+            raise UsageError(
+                f"{case.name}: {what} is {value:.4g}, expected {low:g} to {high:g}, which float32 "
+                "holds: choose another unit of length"
+            )
 
 
 def rays_of(segments: np.ndarray, info: DeviceInfo) -> np.ndarray:

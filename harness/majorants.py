@@ -25,6 +25,8 @@ class Majorant:
     """How far the control lies above the extinction at most, relative to the highest extinction."""
 
 
+BYTES_PER_CELL = 48
+"""What building a majorant takes at most: two bounds, a mean, a control, the result and a copy."""
 EXCESS = 1e-6
 """How far above the extinction a control may be by rounding, relative to the majorant."""
 

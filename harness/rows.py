@@ -151,9 +151,9 @@ def verdict(
     if row["violations"]:
         share = row["violations"] / (row["lookups_per_sample"] * row["counted_samples"])
         remarks.append(f"{100 * share:.3g} % of the lookups were above the majorant")
-    claims = tracker.unbiased and not remarks
+    claims = tracker.unbiased and not row["violations"]
     if claims and result.contradicted(largest_score, ROUNDING[row["arithmetic"]]):
-        return "mismatch", _difference(result)
+        return "mismatch", "; ".join([_difference(result), *remarks])
     if result.unseen:
         remarks.append("all scores are 0: too few samples to tell their variance")
     return "ok", "; ".join(remarks)

@@ -16,7 +16,7 @@ from freepath.config import Config
 from freepath.confirm import SETTLED, confirmed_rows
 from freepath.device import Device, Program
 from freepath.errors import BuildError, DriverLimitError, FreepathError, RunError
-from freepath.jobs import Job, scenes_of
+from freepath.jobs import Job, inputs_of, scenes_of
 from freepath.journal import TWICE
 from freepath.measure import Bench, interleave
 from freepath.pictures import COMPARED, are_there, openimageio, write_pictures
@@ -114,6 +114,7 @@ class Sweep:
             self.folder.close()
             return
         facts = run_file.facts_of(self.config, self.devices, jobs)
+        facts["inputs"] = inputs_of(scenes)
         session = run_file.session_of(self.run_id, self.devices, self.total)
         ended = "failed"
         try:

@@ -439,3 +439,23 @@ def test_an_interrupted_run_can_be_completed(call, work, selector, number):
     assert code == 0
     assert (work / "out" / "summary.csv").read_bytes() == before
     assert len(read_rows(work / "out" / "summary.csv")) == 1
+
+
+def test_a_terminal_without_a_plus_minus_and_a_full_disk(work, selector):
+    (work / "x.yaml").write_text(
+        "name: x\nmatrix: {medium: {homogeneous: {sigma_t: 1}}, tracker: delta}\n"
+        "rays: {orthographic: {resolution: 2}}\nstop: {samples: 20}\n"
+    )
+    command = [sys.executable, "-m", "freepath", "run", "x.yaml", "-d", selector, "-o"]
+    ascii_only = os.environ | {"PYTHONIOENCODING": "ascii"}
+    done = subprocess.run(
+        [*command, "a"], env=ascii_only, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "\\xb1" in done.stdout
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(
+            [*command, "b"], stdout=full, stderr=subprocess.PIPE, text=True, check=False
+        )
+    assert (done.returncode, done.stderr) == (8, "freepath: writing: No space left on device\n")
+    assert (work / "b" / "summary.csv").exists()

@@ -1,12 +1,15 @@
 import dataclasses
+from pathlib import Path
 
 import numpy as np
+import psutil
 import pytest
-from freepath import limits
+from freepath import cli, environment, limits
 from freepath.catalog import load
 from freepath.check.rig import Rig
 from freepath.errors import DriverLimitError
 from freepath.limits import joined, parts_of
+from freepath.results import read_rows
 from freepath.runner import Pace, Runner
 
 
@@ -88,3 +91,71 @@ def test_work_that_cannot_be_smaller_is_an_error(flight, monkeypatch):
     monkeypatch.setattr(Runner, "_read", too_few)
     with pytest.raises(DriverLimitError, match="the driver ends loops"):
         flight.run(4)
+
+
+@pytest.fixture
+def scaled(work, selector, capsys):
+    """Run a grid of 4 x 4 x 4 voxels of some size, and of the same optical depth; its rows."""
+    np.save("v.npy", np.random.default_rng(1).random((4, 4, 4), np.float32) + 0.1)
+
+    def run(size, estimand):
+        trackers = "[delta, ratio, regular]" if estimand == "transmittance" else "[delta, regular]"
+        text = f"""\
+name: scaled
+rays: {{orthographic: {{resolution: 4, direction: [0.3, 0.01, 1]}}}}
+matrix:
+  estimand: {estimand}
+  medium: {{volume: {{file: v.npy, sigma_t: {0.2 / size!r}, voxel_size: {size!r}}}}}
+  majorant: [global, {{grid: {{resolution: 2}}}}]
+  tracker: {trackers}
+stop: {{samples: 400}}
+"""
+        (work / "scaled.yaml").write_text(text)
+        output = f"{estimand}-{size!r}"
+        code = cli.main(["run", "scaled.yaml", "-d", selector, "-o", output])
+        return code, capsys.readouterr().err, Path(output)
+
+    return run
+
+
+@pytest.mark.parametrize(
+    ("estimand", "sizes", "beyond"),
+    [
+        ("transmittance", (2e-30, 1.4e21), (1e-31, 1.5e21, 1e28, 1e30, 1e37)),
+        ("free_path", (1.5e-16, 1.4e14), (1.4e-16, 1.5e14, 1e28)),
+    ],
+)
+def test_the_range_that_float32_holds(scaled, estimand, sizes, beyond):
+    """At both ends of it the same samples have the same scores as with voxels of size 1."""
+    found = {}
+    for size in (1.0, *sizes):
+        code, _, output = scaled(size, estimand)
+        assert code == 0
+        unit = 1.0 if estimand == "transmittance" else size
+        for row in read_rows(output / "summary.csv"):
+            assert row["status"] == "ok"
+            key = row["tracker"], row["majorant"].split("-")[0]
+            numbers = float(row["estimate"]) / unit, float(row["variance"]) / unit**2
+            assert numbers == pytest.approx(found.setdefault(key, numbers), rel=2e-3, abs=1e-9)
+    assert len(found) >= 3
+    for size in beyond:
+        code, said, output = scaled(size, estimand)
+        assert code == 2
+        assert "which float32 holds: choose another unit of length" in said
+        assert not output.exists()
+
+
+def test_a_majorant_that_does_not_fit_is_refused(work, selector, capsys, monkeypatch):
+    (work / "x.yaml").write_text(
+        "name: x\nmatrix: {medium: {homogeneous: {sigma_t: 1}}, tracker: delta,\n"
+        "  majorant: {grid: {resolution: [1, 1, 134217728]}}}\n"
+    )
+    monkeypatch.setattr(environment, "memory_left", lambda: 2**30)
+    assert cli.main(["run", "x.yaml", "-d", selector, "-o", "out"]) == 2
+    wanted = "its majorant of 134217728 cells takes 6 GiB, 1 are left"
+    assert wanted in capsys.readouterr().err
+    assert not Path("out").exists()
+
+
+def test_the_memory_that_is_left():
+    assert 2**20 < environment.memory_left() <= psutil.virtual_memory().total

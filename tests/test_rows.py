@@ -189,10 +189,13 @@ def test_a_variance_that_overflows_makes_a_row_invalid(base):
     assert row_of(base, measurement(round_of(variance=math.inf)))["status"] == "invalid"
 
 
-def test_paths_that_were_cut_off_are_told_and_excused(base):
-    row = row_of(base, measurement(round_of(10**6, truncated=9)), reference=0.52)
+def test_paths_that_were_cut_off_are_told_and_do_not_excuse(base):
+    row = row_of(base, measurement(round_of(10**6, truncated=9)), reference=0.5)
     assert (row["status"], row["truncated"]) == ("ok", 9)
     assert row["reason"] == "9 paths were cut off at the step cap"
+    row = row_of(base, measurement(round_of(10**6, truncated=9)), reference=0.52)
+    assert row["status"] == "mismatch"
+    assert row["reason"].endswith("reference; 9 paths were cut off at the step cap")
 
 
 def test_a_violated_majorant_is_told_and_excused(base):

@@ -198,6 +198,8 @@ def _show(
         print(json.dumps(records(rows), indent=1))
         return _say_failures(rows)
     console = console_of()
+    for told in folder.read_run().get("inputs") or ():
+        console.print(told, highlight=False, markup=False, soft_wrap=True)
     _print_tables(console, rows, load)
     if sweep:
         _print_times(console, sweep)

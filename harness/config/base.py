@@ -17,6 +17,8 @@ from pydantic import (
 )
 from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 
+# each problem takes a search through the text, and nobody reads more
+MOST_PROBLEMS = 100
 # stands in an error's location for the step into {cloud: {...}}: it is no part of the path shown
 INSIDE_KIND = ""
 # the kinds of error whose caret belongs under a key instead of a value
@@ -50,7 +52,7 @@ def _relocated(
         InitErrorDetails(
             type=_explained(line, model), loc=prefix + line["loc"], input=line["input"]
         )
-        for line in error.errors(include_url=False)
+        for line in error.errors(include_url=False)[:MOST_PROBLEMS]
     ]
     return ValidationError.from_exception_data(error.title, lines)
 

@@ -7,10 +7,11 @@ Python values here, so that a mistake in one value does not hide those in others
 from __future__ import annotations
 
 import dataclasses
+import re
 from collections.abc import Iterable
 from typing import Any
 
-from freepath.config.base import INSIDE_KIND, UNKNOWN_KEY, UNKNOWN_KIND
+from freepath.config.base import INSIDE_KIND, MOST_PROBLEMS, UNKNOWN_KEY, UNKNOWN_KIND
 from freepath.config.rules import shown
 from freepath.errors import ConfigError, Problem
 from pydantic import BaseModel, ValidationError
@@ -21,7 +22,11 @@ from ruamel.yaml.reader import ReaderError
 
 Location = tuple[str | int, ...]
 
+MOST_VALUES = 20_000
+"""Keys, values and lines of a text, and keys that merging copies: far beyond what a person writes,
+and read within seconds."""
 _TAG = "tag:yaml.org,2002:"
+_MERGE = _TAG + "merge"
 _TYPED = {_TAG + name for name in ("int", "float", "bool", "null")}
 # dates are no values here: 2024-01-01 stays the text that it is in a description
 _TEXTS = {_TAG + name for name in ("str", "timestamp", "value", "merge")}
@@ -43,6 +48,13 @@ class Document:
         Raises ConfigError with every problem of form: syntax, duplicate or non-text keys, tags.
         """
         text = text.replace("\r\n", "\n")
+        version = re.match(r"(?:\s*(?:#.*)?\n)*%YAML[ \t]+(?!1\.2\s)(\S*)", text)
+        if version:
+            message = f"expected YAML 1.2, got {shown(version[1])}: leave the line out"
+            raise ConfigError([_problem(name, text, version.start(1), "", message)])
+        if sum(text.count(mark) for mark in ":,-[{\n") > MOST_VALUES:
+            message = f"expected at most {MOST_VALUES} keys, values and lines, got more"
+            raise ConfigError([Problem(name, 0, 0, "", message)])
         yaml = YAML(typ="safe", pure=True)
         try:
             root = yaml.compose(text)
@@ -57,7 +69,7 @@ class Document:
         except RecursionError:
             message = "expected a config, got lists or mappings nested too deeply"
             raise ConfigError([Problem(name, 0, 0, "", message)]) from None
-        except (YAMLError, ValueError) as error:
+        except (YAMLError, ValueError, AssertionError) as error:
             message = f"not valid YAML: {' '.join(str(error).split())}"
             raise ConfigError([Problem(name, 0, 0, "", message)]) from None
         if reader.problems:
@@ -153,7 +165,7 @@ def _char(error: ReaderError) -> str:
 def _syntax_problem(name: str, text: str, error: MarkedYAMLError) -> Problem:
     mark, message = error.problem_mark or error.context_mark, error.problem or "syntax error"
     if "'\\t'" in message:
-        message = "expected spaces, got a tab (YAML allows none here)"
+        message = "expected spaces, got a tab: here it is read in quotes only"
     elif "end of stream" in message or "stream end" in message:
         mark = error.context_mark or mark
         message = f"not valid YAML: what opens here is not closed ({error.context})"
@@ -174,10 +186,14 @@ class _Reader:
         self.constructor = yaml.constructor
         self.problems: list[Problem] = []
         self.open: set[int] = set()
+        self.merging: set[int] = set()
+        self.copied = 0
         # an alias is read once, however often it is used, so that nested ones cannot explode
         self.done: dict[int, Any] = {}
 
     def report(self, node: Node, location: Location, message: str) -> None:
+        if len(self.problems) >= MOST_PROBLEMS:
+            return  # each takes a search through the text
         document, index = self.document, node.start_mark.index
         problem = _problem(document.name, document.text, index, path_text(location), message)
         self.problems.append(problem)
@@ -208,7 +224,7 @@ class _Reader:
     def _scalar(self, node: Node, location: Location) -> Any:
         try:
             return self.constructor.construct_object(node, deep=True)
-        except (ValueError, KeyError, YAMLError):
+        except (ValueError, LookupError, ArithmeticError, YAMLError):
             self.report(node, location, f"expected a value, got {shown(node.value)}")
             return None
 
@@ -224,9 +240,34 @@ class _Reader:
                 self.report(key, here, f"expected a key once, got it again (first in line {line})")
             else:
                 first[key.value] = key
-        self.constructor.flatten_mapping(node)
+        self._merge(node, location)
         return {
             key.value: self.value(value, (*location, key.value))
             for key, value in node.value
             if isinstance(key, ScalarNode)
         }
+
+    def _merge(self, node: Node, location: Location) -> list[tuple[Node, Node]]:
+        """Put the pairs that come in through << before the mapping's own; return all of them.
+
+        A key that several sources have comes in once, from the first of them, so that mappings
+        that merge mappings cannot explode.
+        """
+        if not isinstance(node, MappingNode) or id(node) in self.merging:
+            self.report(node, location, "expected a mapping, or a list of them, to merge")
+            return []
+        given = [value for key, value in node.value if key.tag and str(key.tag) == _MERGE]
+        if given:
+            self.merging.add(id(node))
+            own = [(key, value) for key, value in node.value if str(key.tag) != _MERGE]
+            merged: dict[str, tuple[Node, Node]] = {}
+            for value in given:
+                for source in value.value if isinstance(value, SequenceNode) else [value]:
+                    for pair in self._merge(source, location):
+                        merged.setdefault(pair[0].value, pair)
+            self.copied += len(merged)
+            if self.copied > MOST_VALUES:
+                raise ValueError(f"merging (<<) copies more than {MOST_VALUES} keys")
+            node.value = [*merged.values(), *own]
+            self.merging.remove(id(node))
+        return node.value

@@ -230,8 +230,8 @@ class Volume(Medium):
     """Looked for beside the config, then in $FREEPATH_VOLUMES."""
     sigma_t: Extinction = 1.0
     """Scales the density."""
-    grid: Annotated[str, Text("the name of a grid")] | None = None
-    """Which grid of an OpenVDB file."""
+    grid: Annotated[str, Text("the name of a grid", blank=True)] | None = None
+    """Which grid of an OpenVDB file; '' is one without a name, NAME[1] the second of a name."""
     interpolation: Interpolation = "trilinear"
     """How the density is read between voxel centres."""
     voxel_size: Size | None = None

@@ -21,6 +21,8 @@ _UNIT = rf"(?:(?:1\s*)?/\s*)?{_NAME}(?:\s*[*/]\s*{_NAME})*"
 QUANTITY_PATTERN = rf"\s*({_NUMBER})\s*({_UNIT})\s*"
 PERCENT_PATTERN = rf"\s*({_NUMBER})\s*%\s*"
 LARGEST_EXACT = 2**53
+LONGEST = 100
+"""Letters of a number with its unit; pint takes a unit apart by recursion."""
 
 
 class Unit(NamedTuple):
@@ -54,6 +56,8 @@ def convert(text: str, unit: str) -> float | None:
 
     `unit` is a key of UNITS; lengths come back in m, extinctions in 1/m, times in s.
     """
+    if len(text) > LONGEST:
+        return None
     if unit == "fraction":
         match = re.fullmatch(PERCENT_PATTERN, text)
         return float(match[1]) / 100 if match else None

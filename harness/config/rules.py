@@ -89,14 +89,15 @@ class Rule:
 
 @dataclass(frozen=True)
 class Text(Rule):
-    """A text that is not blank; a `pattern`, explained by `what`, must match all of it."""
+    """A text, blank only where said; a `pattern`, explained by `what`, matches all of it."""
 
     what: str = "a text"
     pattern: str = ""
+    blank: bool = False
 
     def check(self, value: Any, context: Any) -> str:
         """Return the text; a number or a truth value is none."""
-        if not isinstance(value, str) or not value.strip():
+        if not isinstance(value, str) or not (value.strip() or self.blank):
             raise expected(self.what, value)
         if self.pattern and not re.fullmatch(self.pattern, value):
             raise expected(self.what, value)
@@ -108,6 +109,8 @@ class Text(Rule):
 
     def json_schema(self) -> dict[str, Any]:
         """Return a string schema."""
+        if self.blank:
+            return {"type": "string"}
         return {"type": "string", "pattern": f"^{self.pattern}$" if self.pattern else r"\S"}
 
 

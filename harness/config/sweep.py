@@ -74,6 +74,8 @@ A bare kind matches whatever its parameters, a mapping the parameters that it gi
 )
 
 
+MOST_SAMPLES = 10**12
+"""Of one ray: a quarter of an hour at a nanosecond each, and no sample is as quick."""
 PRECISELY, EXACTLY = ("error", "time_noise", "at_most"), ("samples", "rounds")
 """The keys of the two ways to stop; one of the other way would say nothing."""
 
@@ -94,7 +96,7 @@ class Stop(Model):
     """Half-width of the 95 % interval of the time of one sample, relative to it."""
     at_most: Annotated[float, Number("time", above=0)] = 10.0
     """Seconds of measuring for one case."""
-    samples: Annotated[int, Number("count", minimum=2)] | None = None
+    samples: Annotated[int, Number("count", minimum=2, maximum=MOST_SAMPLES)] | None = None
     """Exactly so many samples for each ray, instead of the rules above."""
     rounds: Annotated[int, Number("count", minimum=2, maximum=10_000)] = 10
     """How many rounds these samples are taken in, at least; the same layout in every run."""

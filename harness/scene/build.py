@@ -74,7 +74,9 @@ def _volume(model: Any, search_path: SearchPath) -> Medium:
     voxels = extinction(volume.densities, model.sigma_t, volume.path, volume.first)
     to_medium = _inverse(to_world, volume.path)
     name = str(volume.path)
-    return GridMedium(voxels, to_medium, model.interpolation, name, volume.first)
+    medium = GridMedium(voxels, to_medium, model.interpolation, name, volume.first)
+    medium.told = volume.told
+    return medium
 
 
 def _inverse(affine: Array, path: Path) -> Array:

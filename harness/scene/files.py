@@ -16,13 +16,19 @@ def find_file(name: str | Path, search_path: Iterable[str | Path] = ()) -> Path:
     `search_path` (the config's own), of $FREEPATH_VOLUMES, and in the current folder. Raises
     VolumeError where it is in none of them, is a folder, or cannot be read.
     """
-    wanted = Path(name).expanduser()
+    try:
+        wanted = Path(name).expanduser()
+    except RuntimeError as error:  # of a ~ with the name of nobody
+        raise VolumeError(f"{name}: {error}") from error
     variable = os.environ.get("FREEPATH_VOLUMES", "").split(os.pathsep)
     folders = [*search_path, *filter(None, variable), "."]
     places = [wanted] if wanted.is_absolute() else [Path(folder) / wanted for folder in folders]
     for place in places:
-        if place.exists():
-            return _readable(place)
+        try:
+            if place.exists():
+                return _readable(place)
+        except (OSError, ValueError) as error:  # a name that is too long, or holds a NUL
+            raise VolumeError(f"{name}: cannot be looked for: {error}") from error
     looked = ", ".join(dict.fromkeys(str(place.absolute().parent) for place in places))
     hint = "" if "FREEPATH_VOLUMES" in os.environ else "; FREEPATH_VOLUMES may name more folders"
     raise VolumeError(f"{name}: no such file in {looked}{hint}")
@@ -31,6 +37,8 @@ def find_file(name: str | Path, search_path: Iterable[str | Path] = ()) -> Path:
 def _readable(path: Path) -> Path:
     if path.is_dir():
         raise VolumeError(f"{path}: is a folder, expected a file")
+    if not path.is_file():  # reading a pipe would wait for whoever writes to it
+        raise VolumeError(f"{path}: is a pipe or a device, expected a file")
     try:
         with path.open("rb") as file:
             beginning = file.read(1)

@@ -51,6 +51,8 @@ class Medium(ABC):
     """
 
     channels: Array = np.ones(1)
+    told: str = ""
+    """What of which file it is."""
     kernel: str
     offers: frozenset[str]
 

@@ -9,6 +9,7 @@ import numpy as np
 from freepath.errors import VolumeError
 from numpy.typing import NDArray
 
+MOST_VOXELS = 2**31 - 1  # kernels count voxels in 32 bits
 _HEADERS = {
     (1, 0): np.lib.format.read_array_header_1_0,
     (2, 0): np.lib.format.read_array_header_2_0,
@@ -28,8 +29,10 @@ def open_npy(path: Path) -> NDArray:
             shape, _, dtype = _HEADERS[version](file)
             start = file.tell()
             size = file.seek(0, 2)
-    except (ValueError, EOFError, OSError, SyntaxError, tokenize.TokenError) as error:
-        raise VolumeError(f"{path}: is not a .npy file: {_first_line(error)}") from error
+    except (ValueError, EOFError, OSError, SyntaxError, tokenize.TokenError, TypeError) as error:
+        raise VolumeError(f"{path}: is not a .npy file: {first_line(error)}") from error
+    if any(type(size) is not int or size < 0 for size in shape):  # True is an int to numpy
+        raise VolumeError(f"{path}: is damaged, its shape is {shape}")
     if dtype.kind not in "buif":
         what = "Python objects (pickled)" if dtype.hasobject else f"elements of type {dtype}"
         raise VolumeError(f"{path}: holds {what}, expected real numbers")
@@ -42,5 +45,9 @@ def open_npy(path: Path) -> NDArray:
     return np.lib.format.open_memmap(path, mode="r")
 
 
-def _first_line(error: Exception) -> str:
-    return str(error).splitlines()[0] if str(error) else type(error).__name__
+def first_line(error: Exception | str) -> str:
+    """Return the first line of what a library says, or that it says nothing."""
+    lines = str(error).strip().splitlines() or [
+        type(error).__name__ if error else "no reason given"
+    ]
+    return lines[0]

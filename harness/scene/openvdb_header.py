@@ -4,60 +4,112 @@ from __future__ import annotations
 
 import struct
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO, NamedTuple
 
 from freepath.errors import VolumeError
 
 MAGIC = 0x56444220
 OLDEST_KNOWN = 222  # the file format of OpenVDB 2.1 (2013) and later
+SCALARS = ("float", "double", "half", "int32", "int64")
+COUNT_MARK = "\x1e"  # between a name and the count of those that are the same
 
 
-def check_complete(path: Path) -> None:
-    """Refuse what is no OpenVDB file, and one that ends before its last grid does.
+class Entry(NamedTuple):
+    """A grid: its name, its place among those of the same name, the type of its values."""
 
-    OpenVDB itself reads on beyond the end of a truncated file, and may take minutes to stumble over
-    what it makes of it. The layout is that of its Archive::readHeader, MetaMap::readMeta and
+    name: str
+    count: int | None
+    kind: str
+    start: int
+    end: int
+
+    @property
+    def shown(self) -> str:
+        """What a config calls it."""
+        return f"{self.name}[{self.count}]" if self.count else self.name
+
+    @property
+    def unique(self) -> str:
+        """What OpenVDB calls it."""
+        return self.name if self.count is None else f"{self.name}[{self.count}]"
+
+    def __str__(self) -> str:
+        shown = "".join(c if c.isprintable() else "?" for c in self.shown)
+        name = shown or "'' (nameless)"
+        return name if self.kind in SCALARS else f"{name} (of {self.kind})"
+
+
+def contents(path: Path) -> list[Entry] | None:
+    """Return the grids of a file; None where it does not say where they are.
+
+    Refuses what is no OpenVDB file, and one that ends before its last grid does: OpenVDB itself
+    reads on beyond the end of a truncated file, and may take minutes to stumble over what it makes
+    of it. The layout is that of its Archive::readHeader, MetaMap::readMeta and
     GridDescriptor::read.
     """
     size = path.stat().st_size
     with path.open("rb") as file:
         try:
-            ends = _grid_ends(file, path)
-        except struct.error:
-            ends = [size + 1]
-    if any(end > size for end in ends):
+            grids = _entries(file, path)
+        except (struct.error, OSError, OverflowError):
+            grids = [Entry("", None, "", 0, size + 1)]
+    if any(not 0 <= grid.start <= grid.end <= size for grid in grids or ()):
         raise VolumeError(f"{path}: is truncated, its grids go on beyond its end")
+    return grids
 
 
-def _grid_ends(file: BinaryIO, path: Path) -> list[int]:
-    """Return where each grid ends in the file; nothing where the file does not say."""
+def choose(path: Path, grids: list[Entry], wanted: str | None) -> Entry:
+    """Return the grid `wanted`, or the one called density, or the only grid of scalars."""
+    scalars = [grid for grid in grids if grid.kind in SCALARS]
+    listed = ", ".join(sorted(map(str, scalars))) or "none"
+    named = [grid for grid in grids if wanted in (grid.shown, grid.unique)]
+    if wanted is None:
+        named = [grid for grid in grids if grid.name == "density"] or scalars
+        if not scalars:
+            all_of_them = ", ".join(map(str, grids)) or "it is empty"
+            raise VolumeError(f"{path}: it holds no grid of scalars: {all_of_them}")
+    if len(named) > 1:
+        raise VolumeError(f"{path}: it holds several grids, choose one of: {listed}")
+    if not named or named[0].kind not in SCALARS:
+        what = f"{str(named[0])!r} is no grid of scalars" if named else ""
+        what = what or f"there is no grid {wanted!r} of scalars"
+        raise VolumeError(f"{path}: {what}, expected one of: {listed}")
+    return named[0]
+
+
+def _entries(file: BinaryIO, path: Path) -> list[Entry] | None:
     beginning = file.read(8)
     if beginning != struct.pack("<q", MAGIC):
         raise VolumeError(f"{path}: is not an OpenVDB file")
     (version,) = _read(file, "I")
     *_, has_offsets = _read(file, "II?")
     if version < OLDEST_KNOWN or not has_offsets:
-        return []
+        return None
     file.seek(36, 1)  # a UUID in letters
     (entries,) = _read(file, "I")
     for _ in range(entries):
         for _ in ("name", "type", "value"):
-            _skip_string(file)
-    (grids,) = _read(file, "I")
-    ends = []
-    for _ in range(grids):
-        for _ in ("name", "type", "parent"):
-            _skip_string(file)
-        *_, end = _read(file, "qqq")  # the positions of the grid, of its blocks and of its end
-        ends.append(end)
+            _string(file)
+    (count,) = _read(file, "I")
+    grids: list[Entry] = []
+    for _ in range(count):
+        name, kind, _ = (_string(file) for _ in ("name", "type", "parent"))
+        # the positions of the grid, of its blocks and of its end
+        start, _, end = _read(file, "qqq")
+        name, _, place = name.partition(COUNT_MARK)
+        value = kind.removeprefix("Tree_").split("_")[0]
+        grids.append(Entry(name, int(place) if place.isdecimal() else None, value, start, end))
         file.seek(max(end, file.tell()))  # never back, whatever a damaged file says
-    return ends
+    return grids
 
 
-def _read(file: BinaryIO, form: str) -> tuple:
+def _read(file: BinaryIO, form: str) -> tuple[Any, ...]:
     return struct.unpack(f"<{form}", file.read(struct.calcsize(f"<{form}")))
 
 
-def _skip_string(file: BinaryIO) -> None:
+def _string(file: BinaryIO) -> str:
     (length,) = _read(file, "I")
-    file.seek(length, 1)
+    text = file.read(length)
+    if len(text) < length:
+        raise struct.error
+    return text.decode("utf-8", "replace")

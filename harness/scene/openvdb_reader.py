@@ -3,19 +3,21 @@
 Runs by itself, under the Python of the system as well, whose OpenVDB the Python of freepath cannot
 load: it imports nothing of freepath, and numpy only once it reads.
 
-    python3 openvdb_reader.py FILE GRID OUTPUT.npy    (GRID may be empty)
+    python3 openvdb_reader.py REQUEST.json
 
-writes the densities [z, y, x] and prints one JSON object: {"transform": 4 x 4 for row vectors,
-index to world, "minimum": index of the first voxel, x y z}, or {"refused": why} or
-{"no_reader": true}. In OpenVDB an index is the centre of its voxel.
+writes the densities [z, y, x] to the request's `output`, and to its `answer` one JSON object:
+{"transform": 4 x 4 for row vectors, index to world, "minimum" and "maximum": indices of the first
+and the last voxel, x y z, "background"}, or {"refused": why} or {"unread": which readers there
+are}. Libraries write what they like to standard output. In OpenVDB an index is the centre of its
+voxel.
 """
 
 import importlib
 import json
 import mmap
+import resource
 import sys
 
-MOST_VOXELS = 2**31 - 1
 #: numpy's name of the element types of OpenVDB that can be densities
 SCALARS = {"float": "f4", "double": "f8", "half": "f4", "int32": "i4", "int64": "i8"}
 
@@ -30,60 +32,54 @@ def damaged(reason):
     return Refused(f"it is not an OpenVDB file, or a truncated one: {' '.join(printable.split())}")
 
 
-def choose(names, wanted):
-    """Return the index of the grid `wanted`, of the only grid, or of the one called density."""
-    listed = ", ".join(names)
-    if wanted:
-        if wanted not in names:
-            raise Refused(f"there is no grid {wanted!r} of scalars, expected one of: {listed}")
-        return names.index(wanted)
-    if not names:
-        raise Refused("it holds no grid of scalars")
-    if len(names) > 1 and "density" not in names:
-        raise Refused(f"it holds several grids, choose one of: {listed}")
-    return names.index("density") if "density" in names else 0
-
-
-def check_box(minimum, maximum):
-    """Refuse a grid without active voxels, and one too large."""
+def check_box(minimum, maximum, most):
+    """Refuse a grid without active voxels, and one too large for kernels or for its file."""
     count = 1
     for low, high in zip(minimum, maximum, strict=True):
         if high < low:
             raise Refused("the grid is empty: it has no active voxels")
         count *= high - low + 1
-    if count > MOST_VOXELS:
-        raise Refused(f"the grid has {count} voxels, expected at most {MOST_VOXELS}")
+    if count > most[0]:
+        raise Refused(f"the grid has {count} voxels, expected at most {most[0]}")
+    if count > most[1]:
+        what = f"its box has {count} voxels, {4 * count / 2**30:.3g} GiB, hardly any in the file"
+        raise Refused(f"the grid is damaged, or nearly empty: {what}; crop it")
 
 
-def read_with_openimageio(path, grid):
-    """Read by OpenImageIO; None where it was built without OpenVDB."""
+def read_with_openimageio(request):
+    """Read by OpenImageIO; None where it was built without OpenVDB or cannot read the grid."""
     try:
         oiio = importlib.import_module("OpenImageIO")
     except ImportError:
         return None
     if "openvdb" not in oiio.get_string_attribute("format_list").split(","):
         return None
+    path, name, place = request["path"], request["name"], request["place"]
     with open(path, "rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
-        if data.find(b"NonlinearFrustumMap") >= 0:
+        if data.find(b"NonlinearFrustumMap", *request["span"]) >= 0:
             # OpenImageIO reports the identity as the transform of such a grid
-            raise Refused("it has a grid with a frustum transform, expected linear ones")
+            raise Refused("the grid has a frustum transform, expected a linear one")
     image = oiio.ImageInput.open(path)
     if image is None:
-        raise damaged(oiio.geterror())
-    names, places = [], []
-    while image.seek_subimage(len(names), 0):
-        places.append(image.spec().nchannels == 1)
-        names.append(image.spec().getattribute("oiio:subimagename"))
-    scalars = [place for place, scalar in enumerate(places) if scalar]
-    chosen = scalars[choose([names[place] for place in scalars], grid)]
-    image.seek_subimage(chosen, 0)
+        if request["kind"] == "float":
+            raise damaged(oiio.geterror())
+        return None  # what it says of types that it does not read
+    wanted = name if place is None else f"{name}[{place}].{name}"
+    chosen = 0
+    while image.seek_subimage(chosen, 0):
+        if image.spec().getattribute("oiio:subimagename") == wanted:
+            break
+        chosen += 1
+    else:
+        return None
     spec = image.spec()
     window, size = (spec.x, spec.y, spec.z), (spec.width, spec.height, spec.depth)
     minimum = spec.getattribute("openvdb:file_bbox_min") or window
     maximum = spec.getattribute("openvdb:file_bbox_max") or tuple(
         low + count - 1 for low, count in zip(window, size, strict=True)
     )
-    check_box(minimum, maximum)
+    check_box(minimum, maximum, request["most"])
+    check_box(window, [low + n - 1 for low, n in zip(window, size, strict=True)], request["most"])
     voxels = image.read_image(chosen, 0, 0, 1, oiio.UNKNOWN)
     if voxels is None or image.has_error:
         raise damaged(image.geterror())
@@ -93,11 +89,11 @@ def read_with_openimageio(path, grid):
         for low, high, start in zip(minimum, maximum, window, strict=True)
     )
     transform = [list(spec.getattribute("openvdb:indextoworld"))[i : i + 4] for i in (0, 4, 8, 12)]
-    return voxels[z, y, x, 0], transform, list(minimum)
+    return voxels[z, y, x, 0], transform, minimum, maximum, None
 
 
-def read_with_openvdb(path, grid):
-    """Read by OpenVDB's own module, which is called pyopenvdb before 12.0; None without it."""
+def read_with_openvdb(request):
+    """Read by OpenVDB's own module, called pyopenvdb before 12.0; None where it cannot."""
     for name in ("openvdb", "pyopenvdb"):
         try:
             vdb = importlib.import_module(name)
@@ -107,14 +103,19 @@ def read_with_openvdb(path, grid):
         break
     else:
         return None
+    place = "" if request["place"] is None else f"[{request['place']}]"
     try:
-        grids = [g for g in vdb.readAllGridMetadata(path) if g.valueTypeName in SCALARS]
-        names = [g.name for g in grids]
-        chosen = vdb.read(path, names[choose(names, grid)])
-    except (OSError, RuntimeError, KeyError, TypeError) as error:
+        chosen = vdb.read(request["path"], request["name"] + place)
+    except TypeError:  # the module is built for some types of grids only
+        return None
+    except (OSError, RuntimeError, KeyError, ValueError) as error:
         raise damaged(error) from error
+    if chosen.gridClass == "level set":
+        raise Refused("the grid is a level set, which holds distances: convert it to a fog volume")
+    if chosen.valueTypeName not in SCALARS:
+        raise Refused(f"it is a grid of {chosen.valueTypeName}, expected one of scalars")
     minimum, maximum = chosen.evalActiveVoxelBoundingBox()
-    check_box(minimum, maximum)
+    check_box(minimum, maximum, request["most"])
     if not chosen.transform.isLinear:
         raise Refused("the grid has a frustum transform, expected a linear one")
     shape = [high + 1 - low for low, high in zip(minimum, maximum, strict=True)]
@@ -126,23 +127,35 @@ def read_with_openvdb(path, grid):
         [a - b for a, b in zip(chosen.transform.indexToWorld(corner), origin, strict=True)] + [0.0]
         for corner in corners
     ]
-    return voxels.transpose(2, 1, 0), [*rows, [*origin, 1.0]], list(minimum)
+    transform = [*rows, [*origin, 1.0]]
+    return voxels.transpose(2, 1, 0), transform, minimum, maximum, float(chosen.background)
 
 
-def main(path, grid, output):
-    """Read, write the array and say on standard output where it is."""
+def main(request):
+    """Read, write the array and return the answer."""
+    resource.setrlimit(resource.RLIMIT_AS, (request["memory"],) * 2)
+    resource.setrlimit(resource.RLIMIT_CPU, (request["seconds"], request["seconds"] + 1))
     try:
-        result = read_with_openvdb(path, grid) or read_with_openimageio(path, grid)
+        result = read_with_openvdb(request) or read_with_openimageio(request)
+        if result is None:
+            modules = ("openvdb", "pyopenvdb", "OpenImageIO")
+            return {"unread": [name for name in modules if name in sys.modules]}
+        import numpy as np
+
+        voxels, transform, minimum, maximum, background = result
+        np.save(request["output"], np.ascontiguousarray(voxels))
     except Refused as refused:
         return {"refused": str(refused)}
-    if result is None:
-        return {"no_reader": True}
-    import numpy as np
-
-    voxels, transform, minimum = result
-    np.save(output, np.ascontiguousarray(voxels))
-    return {"transform": transform, "minimum": minimum}
+    except MemoryError:
+        limit = f"{request['memory'] / 2**30:.3g} GiB, the limit for a file of this size"
+        return {"refused": f"it is damaged: reading it takes more than {limit}"}
+    box = {"minimum": list(minimum), "maximum": list(maximum)}
+    return {"transform": transform, "background": background, **box}
 
 
 if __name__ == "__main__":
-    print(json.dumps(main(*sys.argv[1:])))
+    with open(sys.argv[1]) as given:
+        asked = json.load(given)
+    answered = main(asked)
+    with open(asked["answer"], "w") as file:
+        json.dump(answered, file)

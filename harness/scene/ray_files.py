@@ -62,6 +62,8 @@ def _numbers(path: Path, line: int, row: list[str]) -> list[float]:
     if len(row) != len(COLUMNS):
         raise VolumeError(f"{path}: row {line}: expected 6 columns, got {len(row)}")
     try:
+        if any("_" in cell for cell in row):  # of Python's own numbers
+            raise ValueError(f"expected numbers, got {', '.join(row)}")
         return [float(cell) for cell in row]
     except ValueError as error:
         raise VolumeError(f"{path}: row {line}: {error}") from error

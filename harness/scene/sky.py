@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,9 @@ import numpy as np
 from freepath.effects import SKY_COLUMNS, SKY_ROWS
 from freepath.errors import VolumeError, imported
 from freepath.scene.files import find_file
+from freepath.scene.images import check_claim, opened, pixels_of
 from freepath.scene.medium import Array
+from freepath.scene.npy import first_line
 from numpy.typing import NDArray
 
 PLACE = "[row, column, channel]"
@@ -28,6 +30,8 @@ class Sky:
     """
 
     table: NDArray[np.float32]
+    told: str = ""
+    """What of the file it is."""
 
     @classmethod
     def of(cls, pixels: Array) -> Sky:
@@ -61,55 +65,79 @@ class Sky:
 def read_sky(light: Any, channels: int, search_path: Iterable[str | Path] = ()) -> Sky:
     """Read the image of a light and resample it for a medium of so many channels.
 
-    A grey medium gets the mean over the image's channels, and all channels of another one the only
-    channel of a grey image; alpha is left out. Raises VolumeError for a file that is not found, is
-    no image of floating-point numbers, has other channels, or a value that is no radiance.
+    Of the channels of an EXR file's first part count R, G, B (or Y) of the first layer, else all of
+    that layer but alpha; the picture is that of the display window. A grey medium gets the mean
+    over these channels, and all channels of another one the only channel of a grey image. Raises
+    VolumeError for a file that is not found, is no image of floating-point numbers, has other
+    channels, or a value that is no radiance.
     """
     path = find_file(light.file, search_path)
-    pixels = _resampled(path, _checked(path, _read(path)))
+    pixels, told = _read(path)
+    pixels = _resampled(path, _checked(path, pixels))
     if channels == 1:
         pixels = pixels.mean(axis=2, keepdims=True)
     elif pixels.shape[2] == 1:
         pixels = np.repeat(pixels, channels, axis=2)
     if pixels.shape[2] != channels:
-        found = f"the image has {pixels.shape[2]} channels"
-        raise VolumeError(f"{path}: {found}, expected 1 or {channels}, as many as the medium")
+        found = f"the image has {pixels.shape[2]} channels, expected 1 or {channels}, as many as"
+        raise VolumeError(f"{told}: {found} the medium")
     with np.errstate(over="ignore"):
-        sky = Sky.of(pixels * light.scale)
+        sky = replace(Sky.of(pixels * light.scale), told=told)
     if not np.isfinite(sky.table).all():
         raise VolumeError(f"{path}: too large for float32 once multiplied by {light.scale:g}")
     return sky
 
 
-def _read(path: Path) -> Array:
-    """Read the first part of an image file, [rows, columns, channels]."""
+def _read(path: Path) -> tuple[Array, str]:
+    """Read the first part of an image file, [rows, columns, channels], and tell what of it."""
     oiio = imported("OpenImageIO", str(path))
 
-    image = oiio.ImageInput.open(str(path))
-    if image is None:
-        raise VolumeError(f"{path}: is not an image: {_first_line(oiio.geterror())}")
-    try:
+    with opened(path) as image:
         spec = image.spec()
-        if spec.deep or spec.depth > 1:
-            raise VolumeError(f"{path}: is a deep or a 3D image, expected a flat one")
         if str(spec.format) not in ("half", "float", "double"):
             expected = "expected radiances as floating-point numbers (such as EXR or HDR)"
             raise VolumeError(f"{path}: {expected}, got {spec.format}")
-        pixels = image.read_image(0, 0, 0, spec.nchannels, oiio.DOUBLE)
-        if pixels is None or image.has_error:
-            raise VolumeError(f"{path}: cannot be read: {_first_line(image.geterror())}")
-    finally:
-        image.close()
-    return np.delete(pixels, spec.alpha_channel, axis=2) if spec.alpha_channel >= 0 else pixels
+        pixels = _in_display_window(path, spec, pixels_of(path, image, 0, oiio.DOUBLE))
+        names, alpha = list(spec.channelnames), spec.alpha_channel
+        more = image.seek_subimage(1, 0)
+    used = _colours(names, alpha)
+    if not used:
+        raise VolumeError(f"{path}: has no channel but alpha")
+    left = [name for place, name in enumerate(names) if place not in (*used, alpha)]
+    left += ["further parts"] * more
+    told = f"{path}: channels {', '.join(names[place] for place in used)}"
+    return pixels[..., used], told + (f"; not used: {', '.join(left)}" if left else "")
 
 
-def _first_line(message: str) -> str:
-    return message.strip().split("\n")[0] or "no reason given"
+def _in_display_window(path: Path, spec: Any, pixels: Array) -> Array:
+    """The picture that an EXR file shows: black where it has no pixels, cut where it has more."""
+    origin, size = (spec.full_y, spec.full_x), (spec.full_height, spec.full_width)
+    at = np.subtract((spec.y, spec.x), origin)
+    if not at.any() and size == pixels.shape[:2]:
+        return pixels
+    check_claim(path, size[0] * size[1] * spec.nchannels, 8)
+    shown = np.zeros((*size, spec.nchannels))
+    y, x = np.clip(at, 0, size)
+    seen = pixels[max(-at[0], 0) :, max(-at[1], 0) :][: size[0] - y, : size[1] - x]
+    shown[y : y + len(seen), x : x + seen.shape[1]] = seen
+    return shown
+
+
+def _colours(names: list[str], alpha: int) -> list[int]:
+    """The places of R, G, B, or Y, of the first layer that has them; else all of the first one."""
+    layers: dict[str, dict[str, int]] = {}
+    for place, name in enumerate(names):
+        if place != alpha:
+            layer, _, channel = name.rpartition(".")
+            layers.setdefault(layer, {})[channel] = place
+    for layer in layers.values():
+        for wanted in (("R", "G", "B"), ("Y",)):
+            if all(channel in layer for channel in wanted):
+                return [layer[channel] for channel in wanted]
+    return list(next(iter(layers.values()), {}).values())
 
 
 def _checked(path: Path, pixels: Array) -> Array:
-    if not pixels.shape[2]:
-        raise VolumeError(f"{path}: has no channel but alpha")
     kinds = {"NaN": np.isnan(pixels), "infinite": np.isinf(pixels), "negative": pixels < 0}
     wrong = [
         f"{int(where.sum())} {kind} (first {PLACE} = {np.argwhere(where)[0].tolist()}: "
@@ -130,5 +158,5 @@ def _resampled(path: Path, pixels: Array) -> Array:
     size = oiio.ROI(0, SKY_COLUMNS, 0, SKY_ROWS, 0, 1, 0, pixels.shape[2])
     result = oiio.ImageBufAlgo.resize(given, filtername="box", roi=size)
     if result.has_error:
-        raise VolumeError(f"{path}: cannot be resized: {_first_line(result.geterror())}")
+        raise VolumeError(f"{path}: cannot be resized: {first_line(result.geterror())}")
     return result.get_pixels(oiio.FLOAT).astype(np.float64)

@@ -7,10 +7,8 @@ from pathlib import Path
 
 import numpy as np
 from freepath.errors import VolumeError
-from freepath.scene.npy import open_npy
+from freepath.scene.npy import MOST_VOXELS, open_npy
 from numpy.typing import NDArray
-
-MOST_VOXELS = 2**31 - 1  # kernels count voxels in 32 bits
 
 
 @dataclass(frozen=True)
@@ -26,16 +24,19 @@ class Volume:
     to_world: NDArray[np.float64]
     first: tuple[int, int, int] = (0, 0, 0)
     """The index of the first voxel in the file's own count, [z, y, x]."""
+    told: str = ""
+    """What of which file it is."""
 
 
 def read_volume(path: Path, grid: str | None = None) -> Volume:
     """Read a .npy, a multi-part EXR, a multi-page TIFF or a grid of an OpenVDB file.
 
-    `grid` names the grid of an OpenVDB file; without it, its only grid or the one called
-    `density`. Raises VolumeError, with the file in its message.
+    `grid` names the grid of an OpenVDB file ('' one without a name, `density[1]` the second of that
+    name); without it, the one called `density` or the only grid of scalars. Raises VolumeError,
+    with the file in its message.
     """
     suffix = path.suffix.lower()
-    first = (0, 0, 0)
+    first, told = (0, 0, 0), ""
     if grid is not None and suffix != ".vdb":
         raise VolumeError(f"{path}: grid {grid!r}: only OpenVDB files have named grids")
     if suffix == ".npy":
@@ -46,14 +47,15 @@ def read_volume(path: Path, grid: str | None = None) -> Volume:
     elif suffix == ".vdb":
         from freepath.scene.openvdb import read_openvdb
 
-        densities, to_world, first = read_openvdb(path, grid)
+        densities, to_world, first, told = read_openvdb(path, grid)
     else:
         from freepath.scene.images import read_slices
 
         densities, to_world = read_slices(path)
     if densities.size > MOST_VOXELS:
         raise VolumeError(f"{path}: {densities.size} voxels, expected at most {MOST_VOXELS}")
-    return Volume(path, densities, to_world, first)
+    told = told or f"{' x '.join(map(str, densities.shape))} voxels [z, y, x] of {densities.dtype}"
+    return Volume(path, densities, to_world, first, f"{path}: {told}")
 
 
 def extinction(

@@ -1,3 +1,5 @@
+import time
+
 import pytest
 from freepath.config.document import Document, path_text
 from freepath.errors import ConfigError
@@ -39,8 +41,8 @@ def test_an_empty_text_has_no_data(text):
 @pytest.mark.parametrize(
     ("text", "line", "column", "message"),
     [
-        ("a: 1\n\tb: 2\n", 2, 1, "expected spaces, got a tab (YAML allows none here)"),
-        ("a:\n\t- 1\n", 2, 1, "expected spaces, got a tab (YAML allows none here)"),
+        ("a: 1\n\tb: 2\n", 2, 1, "expected spaces, got a tab: here it is read in quotes only"),
+        ("a:\n\t- 1\n", 2, 1, "expected spaces, got a tab: here it is read in quotes only"),
         ("a: b: c\n", 1, 5, "not valid YAML: mapping values are not allowed here"),
         ("a: [1, 2\nb: 3\n", 2, 2, "not valid YAML: expected ',' or ']'"),
         ("a: 'x\n", 1, 4, "what opens here is not closed"),
@@ -61,7 +63,7 @@ def test_an_empty_text_has_no_data(text):
         ("a: !!bool x\n", 1, 4, "a: expected a value, got 'x'"),
         ("a: " + "1" * 5000 + "\n", 1, 4, "a: expected a value, got '1111"),
         ("a: &x [*x]\n", 1, 4, "a[0]: expected a value, got an alias that contains itself"),
-        ("a: 1\n<<: 3\n", 2, 5, "expected a mapping or list of mappings for merging"),
+        ("a: 1\n<<: 3\n", 2, 5, "expected a mapping, or a list of them, to merge"),
         ("a: " + "[" * 4000, 0, 0, "nested too deeply"),
     ],
 )
@@ -100,3 +102,68 @@ def test_the_caret_stands_under_the_value():
 def test_path_text():
     assert path_text(("matrix", "medium", 1, "size", 0)) == "matrix.medium[1].size[0]"
     assert path_text(("a b", "c\x1b")) == "'a b'.'c\\x1b'"
+
+
+@pytest.mark.parametrize("text", ["!!int ''", "!!float ''", "!!float _", "!!int '-'", "!!int 0x"])
+def test_tags_whose_value_is_none(text):
+    with pytest.raises(ConfigError, match="x.yaml:1:4: a: expected a value, got"):
+        Document.parse("x.yaml", f"a: {text}\n")
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(("version", "column"), [("1.1", 7), ("1.3", 7), ("2.0", 7)])
+def test_another_version_of_yaml(version, column):
+    wanted = f"x.yaml:1:{column}: expected YAML 1.2, got '{version}': leave the line out"
+    with pytest.raises(ConfigError, match=wanted):
+        Document.parse("x.yaml", f"%YAML {version}\n---\na: yes\n")
+    assert Document.parse("x.yaml", "%YAML 1.2\n---\na: yes\n").data == {"a": "yes"}
+
+
+def bomb(levels):
+    text = "a0: &a0 {k: 1, j: 2}\n"
+    for level in range(1, levels):
+        sources = ", ".join([f"*a{level - 1}"] * 9)
+        text += f"a{level}: &a{level} {{<<: [{sources}], own: {level}}}\n"
+    return text
+
+
+def test_merging_what_merges_is_linear():
+    started = time.process_time()
+    data = Document.parse("x.yaml", bomb(20)).data
+    assert time.process_time() - started < 2
+    assert data["a19"] == {"k": 1, "j": 2, "own": 19}
+
+
+def test_which_of_several_values_merging_takes():
+    text = "a: &a {x: 1, y: 1}\nb: &b {x: 2, z: 2}\nc: {<<: [*a, *b], y: 3}\nd: {y: 4, <<: *b}\n"
+    data = Document.parse("x.yaml", text).data
+    assert data["c"] == {"x": 1, "y": 3, "z": 2}
+    assert data["d"] == {"x": 2, "z": 2, "y": 4}
+
+
+def test_merging_is_bounded_where_it_copies_much():
+    base = "base: &b {" + ", ".join(f"k{i}: 1" for i in range(500)) + "}\n"
+    with pytest.raises(ConfigError, match=r"merging \(<<\) copies more than 20000 keys"):
+        Document.parse("x.yaml", base + "".join(f"m{i}: {{<<: *b}}\n" for i in range(50)))
+
+
+@pytest.mark.parametrize("value", ["*x", "[*x]"])
+def test_merging_a_mapping_into_itself(value):
+    with pytest.raises(ConfigError, match="expected a mapping, or a list of them, to merge"):
+        Document.parse("x.yaml", f"a: &x {{<<: {value}}}\n")
+
+
+@pytest.mark.parametrize(
+    "text", ["".join(f"k{i}: 1\n" for i in range(60_000)), "k: 1\n" * 100_000, "[" + "x," * 99_999]
+)
+def test_more_than_anybody_writes_is_refused_at_once(text):
+    started = time.process_time()
+    with pytest.raises(ConfigError, match="x.yaml: expected at most 20000 keys, values and lines"):
+        Document.parse("x.yaml", text)
+    assert time.process_time() - started < 1
+
+
+def test_of_many_problems_the_first_are_told():
+    with pytest.raises(ConfigError) as error:
+        Document.parse("x.yaml", "k: 1\n" * 3000)
+    assert [problem.line for problem in error.value.problems] == list(range(2, 102))

@@ -328,7 +328,12 @@ BAD_TOP = [
     (GOOD + "stop: {error: 1 s}\n", 6, 15, "stop.error: expected a fraction > 0 and <= 1"),
     (GOOD + "stop: {error: 0}\n", 6, 15, "stop.error: expected a fraction > 0 and <= 1"),
     (GOOD + "stop: {at_most: 3 m}\n", 6, 17, "stop.at_most: expected a time > 0, such as 10 or 10"),
-    (GOOD + "stop: {samples: 0}\n", 6, 17, "stop.samples: expected an integer >= 2, got 0"),
+    (
+        GOOD + "stop: {samples: 0}\n",
+        6,
+        17,
+        "stop.samples: expected an integer from 2 to 1000000000000, got 0",
+    ),
     (GOOD + "stop: {rounds: 20}\n", 6, 8, "stop.rounds: expected beside samples alone, which it"),
     (GOOD + "stop: {at_most: 1, samples: 9}\n", 6, 8, "stop.at_most: expected without samples, of"),
     (GOOD + "stop: {samples: 9, error: 1%}\n", 6, 20, "stop.error: expected without samples, of"),
@@ -510,3 +515,24 @@ def test_find_leaves_a_folder_to_load(tmp_path):
     assert config.find(tmp_path) == tmp_path
     with pytest.raises(ConfigError, match="got a directory"):
         config.load(config.find(tmp_path), {})
+
+
+def test_of_unknown_keys_the_first_are_told(load_text):
+    with pytest.raises(ConfigError) as error:
+        load_text(GOOD + "".join(f"k{i}: 1\n" for i in range(4000)))
+    assert [problem.line for problem in error.value.problems] == list(range(6, 106))
+
+
+@pytest.mark.parametrize("samples", ["9e21", "1000000000001", "9007199254740993"])
+def test_samples_that_would_never_end(load_text, samples):
+    with pytest.raises(
+        ConfigError, match="stop.samples: expected an integer from 2 to 10000000000"
+    ):
+        load_text(GOOD + f"stop: {{samples: {samples}}}\n")
+
+
+def test_a_grid_without_a_name_can_be_asked_for(load_text):
+    text = GOOD.replace("{homogeneous: {sigma_t: 1}}", "{volume: {file: a.vdb, grid: ''}}")
+    assert text != GOOD
+    (medium,) = load_text(text).matrix.medium
+    assert medium.grid == ""

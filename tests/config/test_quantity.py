@@ -163,3 +163,8 @@ def test_pint_is_imported_only_for_a_unit():
         "q.Number('length').check('3 km', None); assert 'pint' in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_a_unit_of_a_thousand_factors_is_none():
+    assert convert("1 m*m/m", "length") == 1.0
+    assert convert("1 /" + "*".join(["m"] * 1000), "1/length") is None

@@ -102,7 +102,7 @@ def test_a_scaled_cloud_that_overflows_is_refused():
 def test_a_transform_that_flattens_is_refused(tmp_path, monkeypatch):
     flat = np.diag([1.0, 0.0, 1.0, 0.0])[:3]
     monkeypatch.setattr(
-        "freepath.scene.openvdb.read_openvdb", lambda *_: (np.ones((2, 2, 2)), flat, (0, 0, 0))
+        "freepath.scene.openvdb.read_openvdb", lambda *_: (np.ones((2, 2, 2)), flat, (0, 0, 0), "")
     )
     (tmp_path / "v.vdb").write_text("never read")
     with pytest.raises(VolumeError, match="its transform cannot be inverted"):

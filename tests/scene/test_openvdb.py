@@ -1,11 +1,9 @@
-import importlib.util
 import struct
 import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
-import OpenImageIO
 import pytest
 from freepath.errors import VolumeError
 from freepath.scene import build_medium, openvdb, openvdb_header, openvdb_reader
@@ -46,12 +44,25 @@ vdb.write(folder + "/unclear.vdb", grids=[tiles, empty])
 vdb.write(folder + "/frustum.vdb", grids=[frustum])
 """
 
+FLOAT, VECTOR = b"Tree_float_5_4_3", b"Tree_vec3s_5_4_3"
 READERS = ("read_with_openvdb", "read_with_openimageio")
 
 
 def run(code, *arguments):
     command = [openvdb.SYSTEM_PYTHON, "-I", "-c", code, *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+def table(*grids, version=224):
+    """An OpenVDB file of a table of contents alone: (name, type, start, end) of each grid."""
+
+    def text(word):
+        return struct.pack("<I", len(word)) + word
+
+    head = struct.pack("<qIII?36sII", openvdb_header.MAGIC, version, 9, 1, True, b"", 0, len(grids))
+    for name, kind, start, end in grids:
+        head += text(name) + text(kind) + text(b"") + struct.pack("<qqq", start, start, end)
+    return head
 
 
 @pytest.fixture(scope="module")
@@ -74,16 +85,16 @@ def one_reader(request, monkeypatch, tmp_path):
     other = next(name for name in READERS if name != request.param)
     script = tmp_path / "one_reader.py"
     text = Path(openvdb_reader.__file__).read_text()
-    silenced = f"def {other}(*_):\n    return None\n\n\ndef unused(path, grid):"
-    script.write_text(text.replace(f"def {other}(path, grid):", silenced))
-    monkeypatch.setattr(openvdb, "_read_here", lambda *_: None)
+    silenced = f"def {other}(*_):\n    return None\n\n\ndef unused(request):"
+    script.write_text(text.replace(f"def {other}(request):", silenced))
+    monkeypatch.setattr(openvdb, "interpreters", lambda: [openvdb.SYSTEM_PYTHON])
     monkeypatch.setattr(openvdb_reader, "__file__", str(script))
 
 
 @pytest.mark.usefixtures("one_reader")
 class TestBothReaders:
     def test_densities_and_transform(self, grids):
-        densities, to_world, first = openvdb.read_openvdb(grids / "many.vdb", None)
+        densities, to_world, first, _ = openvdb.read_openvdb(grids / "many.vdb", None)
         expected = np.arange(5 * 7 * 9).reshape(5, 7, 9).transpose(2, 1, 0)
         assert densities.tolist() == expected.tolist()
         # the centre of the first voxel is index (-3, 2, 10); i goes along y, j against x
@@ -104,7 +115,7 @@ class TestBothReaders:
         ("file", "grid", "message"),
         [
             ("many.vdb", "smoke", "no grid 'smoke' of scalars, expected one of: density, empty, t"),
-            ("many.vdb", "velocity", "no grid 'velocity' of scalars"),
+            ("many.vdb", "velocity", "'velocity (of vec3s)' is no grid of scalars"),
             ("many.vdb", "empty", "the grid is empty: it has no active voxels"),
             ("unclear.vdb", None, "it holds several grids, choose one of: empty, tiles"),
             ("vectors.vdb", None, "it holds no grid of scalars"),
@@ -154,14 +165,13 @@ class TestBothReaders:
         assert str(error.value).startswith(f"{path}: 2 voxels are too large for storage half")
         assert "(first [z, y, x] = [11, 3, 4]: extinction 65536, " in str(error.value)
 
-    def test_too_many_voxels(self, grids):
-        script = Path(openvdb_reader.__file__)
-        script.write_text(script.read_text().replace("2**31 - 1", "314"))
+    def test_too_many_voxels(self, grids, monkeypatch):
+        monkeypatch.setattr(openvdb, "MOST_VOXELS", 314)
         with pytest.raises(VolumeError, match="the grid has 315 voxels, expected at most 314"):
             openvdb.read_openvdb(grids / "many.vdb", "density")
 
     def test_the_real_cloud_is_its_npy_voxel_for_voxel(self, real_volumes):
-        densities, to_world, _ = openvdb.read_openvdb(
+        densities, to_world, *_ = openvdb.read_openvdb(
             real_volumes / "wdas_cloud_sixteenth.vdb", None
         )
         expected = np.load(real_volumes / "cloud_wdas16.npy")
@@ -174,7 +184,7 @@ class TestBothReaders:
 
 def test_a_file_that_is_cut_anywhere_is_refused(grids, tmp_path, monkeypatch):
     # before OpenVDB sees it, which may run for minutes on what lies beyond the end
-    monkeypatch.setattr(openvdb, "_read_here", lambda *_: pytest.fail("read a truncated file"))
+    monkeypatch.setattr(openvdb, "_read_there", lambda *_: pytest.fail("read a truncated file"))
     content = (grids / "many.vdb").read_bytes()
     path = tmp_path / "cut.vdb"
     for size in [*range(9, len(content), 101), len(content) - 1]:
@@ -191,9 +201,9 @@ def test_what_is_no_openvdb_file_is_refused(tmp_path):
 
 @pytest.fixture
 def stub(tmp_path):
-    """Return a file that is OpenVDB by its header, and holds no grid."""
+    """Return a file that is OpenVDB by its table of contents, and holds nothing else."""
     path = tmp_path / "v.vdb"
-    path.write_bytes(struct.pack("<qIII?36sII", openvdb_header.MAGIC, 224, 9, 1, True, b"", 0, 0))
+    path.write_bytes(table((b"density", FLOAT, 0, 0)))
     return path
 
 
@@ -218,7 +228,6 @@ def test_the_two_files_of_the_real_cloud_make_the_same_medium(real_volumes, grid
 
 
 def test_without_a_reader_the_packages_to_install_are_named(stub, monkeypatch):
-    monkeypatch.setattr(openvdb, "_read_here", lambda *_: None)
     monkeypatch.setattr(openvdb, "interpreters", list)
     with pytest.raises(VolumeError) as error:
         openvdb.read_openvdb(stub, None)
@@ -228,18 +237,172 @@ def test_without_a_reader_the_packages_to_install_are_named(stub, monkeypatch):
     assert "python3-openimageio" in text
 
 
+ENTRY = openvdb_header.Entry("density", None, "float", 0, 0)
+
+
 def test_a_python_without_a_reader_says_so(stub):
     # this Python, whose OpenImageIO has no OpenVDB and which has no module of OpenVDB
-    if any(importlib.util.find_spec(name) for name in ("openvdb", "pyopenvdb")):
-        pytest.skip("this Python has a module of OpenVDB")
-    if "openvdb" in OpenImageIO.get_string_attribute("format_list"):
-        pytest.skip("this build of OpenImageIO reads OpenVDB")
-    assert openvdb._read_here(stub, None) is None
-    assert openvdb._read_there(sys.executable, stub, None) is None
+    if openvdb.interpreters()[:1] == [sys.executable]:
+        pytest.skip("this Python has a module of OpenVDB, or an OpenImageIO that reads it")
+    voxels, answer, words = openvdb._read_there(sys.executable, stub, ENTRY)
+    assert (voxels, answer, words) == (None, {"unread": ["OpenImageIO"]}, "")
+
+
+@pytest.fixture
+def reader_that(monkeypatch, tmp_path):
+    """Let the reader's process do something else first."""
+
+    def replace(code):
+        script = tmp_path / "reader.py"
+        head = "def read_with_openvdb(request):\n"
+        text = Path(openvdb_reader.__file__).read_text()
+        assert head in text
+        script.write_text(text.replace(head, f"{head}    {code}\n"))
+        monkeypatch.setattr(openvdb_reader, "__file__", str(script))
+
+    return replace
+
+
+@pytest.mark.parametrize(
+    ("code", "message"),
+    [
+        (
+            "bytearray(4 << 30)",
+            r"it is damaged: reading it takes more than 1\.69 GiB, the limit for",
+        ),
+        ("while True: pass", "cannot be read: that took more than 1 s for"),
+        ("__import__('time').sleep(60)", "cannot be read: that took more than 1 s for"),
+        ("__import__('os').abort()", "cannot be read: .* failed with status -6"),
+        ("raise ValueError('\x1b[2Jodd')", "cannot be read: ValueError: .2Jodd"),
+    ],
+)
+def test_the_reader_has_limits_and_may_end(stub, reader_that, monkeypatch, code, message):
+    monkeypatch.setattr(openvdb, "SECONDS", 1)
+    monkeypatch.setattr(openvdb, "SECONDS_PER_MIB", 0)
+    reader_that(code)
+    with pytest.raises(VolumeError, match=message):
+        openvdb._read_there(sys.executable, stub, ENTRY)
+
+
+def test_what_libraries_print_is_passed_on_and_is_no_answer(stub, reader_that):
+    reader_that("print('\x1b[35m WARN: old file\x1b[0m'); print('{}')")
+    _, answer, words = openvdb._read_there(sys.executable, stub, ENTRY)
+    assert "unread" in answer
+    assert words == "WARN: old file; {}"
+
+
+CHOICES = {
+    "the only one": ([(b"smoke", FLOAT)], None, "smoke"),
+    "beside another type": ([(b"smoke", FLOAT), (b"p", b"Tree_ptdataidx32_5_4_3")], None, "smoke"),
+    "density": ([(b"a", FLOAT), (b"density", FLOAT)], None, "density"),
+    "by name": ([(b"a", FLOAT), (b"density", FLOAT)], "a", "a"),
+    "nameless": ([(b"\x1e0", FLOAT), (b"heat", FLOAT)], "", ""),
+    "first of two": ([(b"density\x1e0", FLOAT), (b"density\x1e1", FLOAT)], "density", "density"),
+    "second": ([(b"density\x1e0", FLOAT), (b"density\x1e1", FLOAT)], "density[1]", "density[1]"),
+    "halves": ([(b"density", b"Tree_float_5_4_3_HalfFloat")], None, "density"),
+}
+UNCLEAR = {
+    "vectors": ([(b"density", VECTOR), (b"t", FLOAT)], "no grid of scalars, expected one of: t"),
+    "truth": ([(b"density", b"Tree_bool_5_4_3"), (b"t", FLOAT)], "'density (of bool)' is no grid"),
+    "two": ([(b"density\x1e0", FLOAT), (b"density\x1e1", FLOAT)], "of: density, density[1]"),
+    "none called density": ([(b"\x1e0", FLOAT), (b"heat", FLOAT)], "of: '' (nameless), heat"),
+    "no scalars": ([(b"v\x1b", VECTOR)], "it holds no grid of scalars: v? (of vec3s)"),
+}
+
+
+@pytest.mark.parametrize(("grids", "wanted", "found"), CHOICES.values(), ids=CHOICES)
+def test_which_grid_is_read(tmp_path, grids, wanted, found):
+    path = tmp_path / "v.vdb"
+    path.write_bytes(table(*[(*grid, 0, 0) for grid in grids]))
+    assert openvdb_header.choose(path, openvdb_header.contents(path), wanted).shown == found
+
+
+@pytest.mark.parametrize(("grids", "message"), UNCLEAR.values(), ids=UNCLEAR)
+def test_no_other_grid_is_read_in_its_place(tmp_path, grids, message):
+    path = tmp_path / "v.vdb"
+    path.write_bytes(table(*[(*grid, 0, 0) for grid in grids]))
+    with pytest.raises(VolumeError) as error:
+        openvdb.read_openvdb(path, None)
+    assert message in str(error.value)
+
+
+@pytest.mark.parametrize(("start", "end"), [(0, 2**63 - 1), (0, -1), (-5, 0), (9, 8), (0, 2**62)])
+def test_offsets_out_of_range(tmp_path, start, end):
+    path = tmp_path / "v.vdb"
+    path.write_bytes(table((b"density", FLOAT, start, end), (b"heat", FLOAT, 0, 0)))
+    with pytest.raises(VolumeError, match="is truncated"):
+        openvdb.read_openvdb(path, None)
+
+
+OTHERS = """
+import sys
+import pyopenvdb as vdb
+
+grids = []
+for name, value in (("density", 1.5), ("density", 2.5), ("", 3.5)):
+    grid = vdb.FloatGrid()
+    grid.name = name
+    grid.fill((0, 0, 0), (3, 2, 1), value)
+    grids.append(grid)
+vdb.write(sys.argv[1] + "/three.vdb", grids=grids)
+grids[1].name = "second"
+vdb.write(sys.argv[1] + "/two.vdb", grids=grids[:2])
+vdb.write(sys.argv[1] + "/one.vdb", grids=grids[:1])
+vdb.write(sys.argv[1] + "/level.vdb", grids=[vdb.createLevelSetSphere(5.0)])
+grids[0].fill((1200, 1200, 1200), (1200, 1200, 1200), 1.0)
+vdb.write(sys.argv[1] + "/empty.vdb", grids=grids[:1])
+"""
+
+
+@pytest.fixture(scope="module")
+def odd(grids, tmp_path_factory):
+    """Return a folder with OpenVDB files that are sound, but not the usual ones."""
+    folder = tmp_path_factory.mktemp("odd")
+    done = run(OTHERS, folder)
+    assert done.returncode == 0, done.stderr
+    one, two = (folder / f"{name}.vdb" for name in ("one", "two"))
+    # the second type in the table of contents becomes one that the module lacks
+    before, after = two.read_bytes().split(b"second", 1)
+    two.write_bytes(before + b"second" + after.replace(b"Tree_float", b"Tree_vec3d", 1))
+    (folder / "whole.vdb").write_bytes(one.read_bytes().replace(FLOAT, b"Tree_int32_5_4_3", 1))
+    (folder / "newer.vdb").write_bytes(one.read_bytes().replace(b"\xe0\0\0\0", b"\xe1\0\0\0", 1))
+    return folder
+
+
+@pytest.mark.usefixtures("one_reader")
+class TestOddFiles:
+    @pytest.mark.parametrize(
+        ("file", "grid", "value"),
+        [
+            ("two.vdb", None, 1.5),
+            ("three.vdb", "density", 1.5),
+            ("three.vdb", "density[1]", 2.5),
+            ("three.vdb", "", 3.5),
+            ("newer.vdb", None, 1.5),
+        ],
+    )
+    def test_what_can_be_read_is(self, odd, file, grid, value):
+        densities, _, _, told = openvdb.read_openvdb(odd / file, grid)
+        assert densities.tolist() == np.full((2, 3, 4), value).tolist()
+        assert "of float, active box [0, 0, 0] to [3, 2, 1] [x, y, z], background " in told
+        assert ("got version 225" in told) == (file == "newer.vdb")
+
+    def test_a_type_that_no_reader_has(self, odd):
+        wanted = "grid density is of int32, which (pyopenvdb|OpenImageIO) cannot read"
+        with pytest.raises(VolumeError, match=wanted):
+            openvdb.read_openvdb(odd / "whole.vdb", None)
+
+    def test_a_box_that_is_not_in_the_file(self, odd):
+        with pytest.raises(VolumeError, match="box has 1732323601 voxels, 6.45 GiB, hardly any in"):
+            openvdb.read_openvdb(odd / "empty.vdb", None)
+
+
+def test_a_level_set_is_called_one(odd, monkeypatch):
+    with pytest.raises(VolumeError, match="the grid is a level set, which holds distances"):
+        openvdb.read_openvdb(odd / "level.vdb", None)
 
 
 def test_a_reader_that_crashes_is_an_error(stub, monkeypatch):
-    monkeypatch.setattr(openvdb, "_read_here", lambda *_: None)
     monkeypatch.setattr(openvdb, "interpreters", lambda: ["/bin/false"])
     with pytest.raises(VolumeError, match="cannot be read: /bin/false failed with status 1"):
         openvdb.read_openvdb(stub, None)

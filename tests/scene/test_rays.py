@@ -185,6 +185,7 @@ BAD_CSV = {
     "infinity": (f"{HEADER}\n0,0,0,inf,0,1", "row 2: direction_x is inf"),
     "no direction": (f"{HEADER}\n0,0,0,0,0,1\n0,0,0,0,0,0", "row 3: the direction has length 0"),
     "an open quote": (f'{HEADER}\n0,0,0,0,0,"1', "is not a .csv file"),
+    "Python's digits": (f"{HEADER}\n0_5,0,0,0,0,1", "row 2: expected numbers, got 0_5, 0, 0, 0, 0"),
     "no text": ("\0\udcff", "is not a .csv file"),
 }
 

@@ -137,3 +137,62 @@ def test_nothing_shines(work, selector, capsys):
     assert cli.main(["run", "sky.yaml", "-d", selector, "-o", "out"]) == 0
     (row,) = read_rows(work / "out" / "summary.csv")
     assert float(row["estimate"]) == float(row["reference"]) == 0
+
+
+def sky_of(path, pixels, names, window=(0, 0), shown=None):
+    """Write an EXR with these channels, a data window at (y, x) and a display window (h, w)."""
+    height, width = pixels.shape[:2]
+    spec = oiio.ImageSpec(width, height, len(names), "float")
+    spec.channelnames = names
+    spec.y, spec.x = window
+    spec.full_height, spec.full_width = shown or (height, width)
+    output = oiio.ImageOutput.create(str(path))
+    assert output.open(str(path), spec)
+    assert output.write_image(pixels.astype(np.float32))
+    assert output.close()
+    return Image(file=str(path))
+
+
+@pytest.mark.parametrize("window", [(0, 0), (3, 5), (-2, -3), (6, 14), (9, 20)])
+def test_a_sky_is_the_picture_of_its_display_window(tmp_path, window):
+    pixels = np.random.default_rng(4).random((4, 8, 3))
+    whole = np.zeros((8, 16, 3))
+    for row, column in np.ndindex(4, 8):
+        y, x = row + window[0], column + window[1]
+        if 0 <= y < 8 and 0 <= x < 16:
+            whole[y, x] = pixels[row, column]
+    expected = read_sky(write(tmp_path / "whole.exr", whole), 3)
+    found = read_sky(sky_of(tmp_path / "a.exr", pixels, ("R", "G", "B"), window, (8, 16)), 3)
+    np.testing.assert_array_equal(found.table, expected.table)
+
+
+@pytest.mark.parametrize(
+    ("names", "used", "left"),
+    [
+        (("R", "G", "B", "Z"), "R, G, B", "Z"),
+        (("R", "G", "B", "A", "mask"), "R, G, B", "mask"),
+        (("R", "G", "B", "diffuse.R", "diffuse.G", "diffuse.B"), "R, G, B", "diffuse.R, "),
+        (("Y", "Z"), "Y", "Z"),
+        (("beauty.R", "beauty.G", "beauty.B", "depth.Z"), "beauty.R, beauty.G, beauty.B", "dep"),
+    ],
+)
+def test_channels_beside_colours_are_no_radiance(tmp_path, names, used, left):
+    pixels = np.full((4, 8, len(names)), 1000.0)
+    count = len(used.split(", "))
+    light = sky_of(tmp_path / "a.exr", pixels, names)
+    told = read_sky(light, 1).told
+    order = [names.index(name) for name in used.split(", ")]
+    pixels[..., order] = np.linspace(0.25, 0.75, count)
+    sky = read_sky(sky_of(tmp_path / "a.exr", pixels, names), 1)
+    np.testing.assert_allclose(sky.table, np.linspace(0.25, 0.75, count).mean(), rtol=1e-6)
+    assert told == sky.told
+    assert told.startswith(f"{light.file}: channels {used}; not used: {left}")
+
+
+def test_what_is_used_of_a_sky_is_told(work, selector, capsys):
+    (work / "sky.yaml").write_text(CONFIG)
+    sky_of(work / "sky.exr", np.full((2, 4, 4), 0.5), ("R", "G", "B", "Z"))
+    assert cli.main(["run", "sky.yaml", "-d", selector, "-o", "out"]) == 0
+    told = "sky.exr: channels R, G, B; not used: Z"
+    assert told in capsys.readouterr().out
+    assert told in (work / "out" / "run.json").read_text()

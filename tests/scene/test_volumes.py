@@ -1,3 +1,5 @@
+import os
+
 import numpy as np
 import pytest
 from freepath.errors import VolumeError
@@ -202,3 +204,44 @@ def test_folders_and_unreadable_files_are_refused(tmp_path):
             find_file(path)
     else:
         pytest.skip("this user may read every file")
+
+
+@pytest.mark.parametrize("shape", ["(2, -3, -4)", "(2, True, 4)", "(2, None, 4)", "(2.0, 3, 4)"])
+def test_shapes_that_are_none(tmp_path, shape):
+    header = f"{{'descr': '<f4', 'fortran_order': False, 'shape': {shape}}}".ljust(117) + "\n"
+    content = b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little") + header.encode()
+    (tmp_path / "v.npy").write_bytes(content + bytes(96))
+    with pytest.raises(VolumeError, match="is damaged, its shape is|is not a .npy file: "):
+        read_volume(tmp_path / "v.npy")
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("~nosuchuser/v.npy", "~nosuchuser/v.npy: Could not determine home directory"),
+        ("n" * 300 + ".npy", "cannot be looked for: .*File name too long"),
+        ("a\0b.npy", "no such file|cannot be looked for: embedded null byte"),
+    ],
+)
+def test_names_that_no_file_can_have(name, message):
+    with pytest.raises(VolumeError, match=message):
+        find_file(name)
+
+
+def test_a_pipe_is_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "v.npy")
+    with pytest.raises(VolumeError, match="v.npy: is a pipe or a device, expected a file"):
+        find_file(tmp_path / "v.npy")
+
+
+@pytest.mark.parametrize("name", ["v.nvdb", "v.npz", "v.vol", "v.npy.gz", "v.raw", "v"])
+def test_which_formats_are_read_is_told(tmp_path, name):
+    (tmp_path / name).write_bytes(b"\x1f\x8b" + bytes(100))
+    with pytest.raises(VolumeError, match=r"expected .npy, EXR, TIFF or OpenVDB \(.vdb\)$"):
+        read_volume(tmp_path / name)
+
+
+def test_what_was_read_is_told(tmp_path):
+    np.save(tmp_path / "v.npy", DENSITIES)
+    volume = read_volume(tmp_path / "v.npy")
+    assert volume.told == f"{tmp_path / 'v.npy'}: 2 x 3 x 4 voxels [z, y, x] of float64"
