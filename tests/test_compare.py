@@ -43,6 +43,8 @@ def row_of(name, **changes):
         "bias_stderr": "0.0005",
         "variance": "0.25",
         "time_per_sample_s": "1e-06",
+        "lane_occupancy": "0.9",
+        "majorant": "none",
     }
     return row | changes
 
@@ -195,6 +197,7 @@ def write(folder, run, *, names=None, processor="x"):
             for number, seconds in run.times[key].items():
                 values = {"case_id": key[0], "device": "d", "platform": "p", "round": number}
                 values |= {"samples": 1000, "time_device_s": 1000 * seconds, "variance": 0.25}
+                values["time_wall_s"] = values["time_device_s"]
                 writer.writerow(dict.fromkeys(SAMPLE_COLUMNS, "") | values)
     host = {"processor": processor, "cores": 2, "system": "s"}
     (folder / "run.json").write_text(json.dumps({"sessions": [{"host": host}]}))

@@ -25,6 +25,7 @@ ORDER = (
     ("limits", "selection"),
     ("runner",),
     ("measure", "journal"),
+    ("reading",),
     ("results",),
     ("rows", "table", "binding", "confirm", "pictures"),
     ("equal_time", "report", "compare"),
@@ -41,9 +42,10 @@ LONGEST = 300
 ONLY_CSV = {
     "table": {"errors"},
     # the pictures of a run are files beside its CSV
-    "report": {"errors", "results", "table", "report", "version", "pictures"},
-    "compare": {"errors", "results", "table", "compare"},
-    "results": {"errors", "journal"},
+    "report": {"answers", "errors", "reading", "results", "table", "report", "version", "pictures"},
+    "compare": {"errors", "reading", "results", "table", "compare"},
+    "results": {"errors", "journal", "reading"},
+    "reading": {"errors"},
     "journal": {"errors"},
 }
 """What modules may import that work on rows of CSV and on nothing else."""

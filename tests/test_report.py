@@ -37,6 +37,7 @@ ROW = dict.fromkeys(COLUMNS, "") | {
     "lane_occupancy": "0.9",
     "time_noise": "0.02",
     "variance_noise": "0.02",
+    "estimate": "0.5",
     "reference": "0.5",
     "variance": "0.25",
     "bias": "0.0",
@@ -73,6 +74,7 @@ def result_of(folder, rows, confirmed=()):
 
 CONFIRMED = dict.fromkeys(CONFIRM_COLUMNS, "") | {
     "case_id": "0",
+    "case": ROW["case"],
     "device": "a [b] <c>",
     "platform": "p",
     "reference": "0.5",

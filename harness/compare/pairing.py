@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections import defaultdict
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,7 +9,8 @@ from typing import Any
 
 import numpy as np
 from freepath.errors import FreepathError
-from freepath.results import RUN, SAMPLE_COLUMNS, SAMPLES, SUMMARY, read_rows
+from freepath.reading import facts
+from freepath.results import RUN, SUMMARY, read_result
 from freepath.table import Row
 
 Key = tuple[str, ...]
@@ -65,11 +65,10 @@ def load(path: Path) -> Side:
 
 
 def _run(folder: Path) -> Run:
-    rows = {_key(row): row for row in read_rows(folder / SUMMARY) if row["status"] != "skipped"}
+    cases, rounds = read_result(folder)
+    rows = {_key(row): row for row in cases if row["status"] != "skipped"}
     times: dict[Key, dict[int, float]] = defaultdict(dict)
     variances: dict[Key, list[float]] = defaultdict(list)
-    samples = folder / SAMPLES
-    rounds = read_rows(samples, SAMPLE_COLUMNS) if samples.is_file() else []
     sizes: dict[Key, str] = {}
     for row in rounds:
         key = _key(row)
@@ -91,10 +90,9 @@ def _key(row: Row) -> Key:
 
 def _host(folder: Path) -> dict[str, Any]:
     try:
-        sessions = json.loads((folder / RUN).read_text("utf-8"))["sessions"]
-        host = sessions[-1]["host"]
+        host = facts(folder / RUN)["sessions"][-1]["host"]
         return {name: host[name] for name in HOST}
-    except (OSError, ValueError, LookupError, TypeError):
+    except (LookupError, TypeError):
         return {}
 
 
