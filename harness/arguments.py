@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 from pathlib import Path
 from typing import Any
 
@@ -50,6 +51,15 @@ def add_trackers(command: Any) -> None:
         metavar="DIR",
         help="a folder with further trackers, one .cl file each; may be repeated",
     ).complete = shtab.DIRECTORY
+
+
+def number_or_percent(text: str) -> float:
+    """A number, or a share written as `5%` or `5 %`; NaN where it is none."""
+    plain = text.strip().removesuffix("%")
+    try:
+        return float(plain) / (100.0 if plain != text.strip() else 1.0)
+    except ValueError:
+        return math.nan
 
 
 def positive(text: str) -> float:

@@ -45,6 +45,19 @@ def short(value: float | None, digits: int = 3) -> str:
     return "" if value is None else f"{value:.{digits}g}"
 
 
+def markdown_text(text: str) -> str:
+    """A text that Markdown shows as it is, in a line."""
+    special = {c: f"\\{c}" for c in "\\`*_[]<>|#"} | {"\n": " ", "\r": " "}
+    return text.translate(str.maketrans(special))
+
+
+def markdown_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
+    """The lines of a table of Markdown."""
+    lines = (" | ".join(map(markdown_text, row)) for row in (header, *rows))
+    first, *others = (f"| {line} |" for line in lines)
+    return [first, "|" + " --- |" * len(header), *others]
+
+
 def by_device(rows: Iterable[Row]) -> dict[str, list[Row]]:
     """Rows by the name of their device with its platform and driver."""
     found: dict[str, list[Row]] = defaultdict(list)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import shtab
-from freepath.arguments import add_device, add_trackers, positive
+from freepath.arguments import add_device, add_trackers, number_or_percent, positive
 
 if TYPE_CHECKING:
     from freepath.recommend import Finding
@@ -74,11 +74,7 @@ def add(commands: Any) -> None:
 
 
 def _accuracy(text: str) -> float:
-    percent = text.strip().endswith("%")
-    try:
-        value = float(text.strip().removesuffix("%")) / (100 if percent else 1)
-    except ValueError:
-        value = 0.0
+    value = number_or_percent(text)
     if not 1e-6 <= value < 1.0:
         raise argparse.ArgumentTypeError(
             f"expected a relative error such as 1% or 0.01, from 1e-6 to below 1, got '{text}'"

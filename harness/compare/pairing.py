@@ -106,6 +106,31 @@ def refuse(reference: Side, contender: Side) -> str:
     return ""
 
 
+PAIRED = ("case_id", "device", "platform")
+NAMED = ("estimand", "medium", "rays", "light", "tracker", "majorant", "tightness", "lanes", "seed")
+NAMED += ("arithmetic", "storage", "params")
+
+
+def unpaired(reference: Side, contender: Side) -> str:
+    """Why no case of two sides pairs: what they have not in common; '' where some pair."""
+    sides = [list(side.rows.values()) for side in (reference, contender)]
+    if reference.rows.keys() & contender.rows.keys():
+        return ""
+    values = [{name: {row[name] for row in rows} for name in (*PAIRED, *NAMED)} for rows in sides]
+    other = [name for name in values[0] if not values[0][name] & values[1][name]]
+    other = [name for name in other if name != "case_id"] if "case_id" in other else other
+    told = [
+        f"{name} is {_listed(values[0][name])} and {_listed(values[1][name])}" for name in other
+    ]
+    why = "; ".join(told[:3]) or "their case_ids differ"
+    return f"no case of one pairs with a case of the other: {why}"
+
+
+def _listed(values: set[str]) -> str:
+    first = sorted(values)[:2]
+    return " or ".join(f"'{one}'" for one in first) + (", ..." if len(values) > 2 else "")
+
+
 def scenes(run: Run) -> dict[Key, list[Key]]:
     """The cases that were measured in turns: those of a medium and its rays on a device."""
     found: dict[Key, list[Key]] = defaultdict(list)

@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from freepath.report.data import LADDER, Report, known_to
-from freepath.table import marked, seconds, short, soonest
+from freepath.table import markdown_table, markdown_text, marked, seconds, short, soonest
 from rich.markup import escape
 from rich.table import Table
 
@@ -75,26 +75,17 @@ def cells(row: dict[str, Any]) -> list[str]:
     ]
 
 
-def _markdown_row(texts: list[str] | tuple[str, ...]) -> str:
-    special = str.maketrans({c: f"\\{c}" for c in "\\`*_[]<>|#"} | {"\n": " ", "\r": " "})
-    return "| " + " | ".join(text.translate(special) for text in texts) + " |"
-
-
-def _markdown_table(header: list[str] | tuple[str, ...], rows: list[list[str]]) -> list[str]:
-    return [_markdown_row(header), "|" + " --- |" * len(header), *map(_markdown_row, rows)]
-
-
 def markdown(report: Report) -> str:
     """The whole report: winners, all cases, and where it was measured."""
     lines = ["# What accuracy costs in time", ""]
-    lines += _markdown_table(["question", "device", *TARGETS.values()], winners(report))
+    lines += markdown_table(["question", "device", *TARGETS.values()], winners(report))
     for question in report.values("q"):
         rows = [cells(row) for row in report.rows if row["q"] == question]
-        lines += ["", f"## {question}".translate({ord("\n"): " "}), ""]
-        lines += _markdown_table(HEADER, rows)
+        lines += ["", f"## {markdown_text(question)}", ""]
+        lines += markdown_table(HEADER, rows)
     lines += ["", "## Environment", ""]
     facts = [[key, value] for run in report.runs for key, value in environment(run)]
-    lines += _markdown_table(["", ""], facts)
+    lines += markdown_table(["", ""], facts)
     return "\n".join(lines) + "\n"
 
 
