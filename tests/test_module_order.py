@@ -27,7 +27,8 @@ ORDER = (
     ("measure", "journal"),
     ("reading",),
     ("results",),
-    ("rows", "table", "binding", "confirm", "pictures"),
+    ("rows", "table", "markdown", "binding", "confirm", "pictures"),
+    ("answers",),
     ("equal_time", "report", "compare"),
     ("sweep",),
     ("session", "arguments", "device_setup"),
@@ -41,9 +42,21 @@ PLACE = {name: place for place, names in enumerate(ORDER) for name in names}
 LONGEST = 300
 ONLY_CSV = {
     "table": {"errors"},
+    "answers": {"table"},
+    "markdown": set(),
     # the pictures of a run are files beside its CSV
-    "report": {"answers", "errors", "reading", "results", "table", "report", "version", "pictures"},
-    "compare": {"errors", "reading", "results", "table", "compare"},
+    "report": {
+        "answers",
+        "errors",
+        "markdown",
+        "pictures",
+        "reading",
+        "report",
+        "results",
+        "table",
+        "version",
+    },
+    "compare": {"errors", "markdown", "reading", "results", "table", "compare"},
     "results": {"errors", "journal", "reading"},
     "reading": {"errors"},
     "journal": {"errors"},

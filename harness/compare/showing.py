@@ -12,8 +12,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from freepath import markdown
 from freepath.compare.judging import REGRESSIONS, TO_SHOW, VERDICTS, Judged
-from freepath.table import markdown_table, markdown_text, short
+from freepath.table import short
 from rich.markup import escape
 from rich.table import Table
 
@@ -150,15 +151,15 @@ def as_markdown(reference: str, names: Sequence[str], results: Sequence[Sequence
     """For a pull request: what is not the same first, and the rest folded away."""
     parts = []
     for name, judged in zip(names, results, strict=True):
-        title = markdown_text(f"{name} compared with {reference}")
+        title = markdown.text_of(f"{name} compared with {reference}")
         parts += [f"**{title}: {totals(judged)}**", "", *filter(None, [undecided(judged), ""])]
         changed = [cells(one) for one in judged if one.verdict not in ("SAME", "UNDECIDED")]
         others = [cells(one) for one in judged if one.verdict in ("SAME", "UNDECIDED")]
         if changed:
-            parts += [*markdown_table(HEADER, changed), ""]
+            parts += [*markdown.table_of(HEADER, changed), ""]
         if others:
             parts += [f"<details><summary>{len(others)} others</summary>", ""]
-            parts += [*markdown_table(HEADER, others), "", "</details>", ""]
+            parts += [*markdown.table_of(HEADER, others), "", "</details>", ""]
     return "\n".join([*parts, f"{LIMITS}.", ""])
 
 

@@ -9,10 +9,21 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from freepath.answers import Case
 from freepath.errors import FreepathError
 from freepath.reading import facts
 from freepath.results import CHECKS, CONFIRM, CONFIRM_COLUMNS, RUN, SUMMARY, read_result, read_rows
-from freepath.table import ROUGH, Row, along, bounces, lit, number, tracker_label, uncertainty
+from freepath.table import (
+    ROUGH,
+    Row,
+    along,
+    bounces,
+    lit,
+    number,
+    settled,
+    tracker_label,
+    uncertainty,
+)
 
 DEEPEST, HIGHEST = 1e-4, 10.0
 """Relative errors between which curves are drawn."""
@@ -150,7 +161,17 @@ def _record(row: Row, variants: list[tuple[str, str]], device: str) -> dict[str,
         "vn": number(row, "variance_noise"),
     }
     record |= _errors(row) | {name: _time(row[column]) for name, column in LADDER.items()}
-    return record | {"rough": [name for name in LADDER if known_to(record, name) > ROUGH]}
+    rough = [name for name in LADDER if known_to(record, name) > ROUGH]
+    unknown = [name for name in rough if not settled(known_to(record, name))]
+    return record | {"rough": rough, "unknown": unknown}
+
+
+def answered(record: dict[str, Any], name: str = "t1") -> Case | None:
+    """A record as answers rank it; None where it does not reach the accuracy."""
+    if record["v"] is None or not isinstance(record[name], float):
+        return None
+    parts = (record[one] for one in ("case", "tracker", "label", "bound", "x", name))
+    return Case(*parts, known_to(record, name), record["b"])
 
 
 def known_to(record: dict[str, Any], name: str) -> float:
