@@ -14,7 +14,7 @@ SIGNIFICANT = 4.0
 """Standard deviations beyond which the biases of single rays are more than the noise in them."""
 SIX = 6.0
 """Standard errors beyond which what claims to be unbiased is not: by chance 2 in 1e9."""
-CARRIERS = 40.0
+CARRIERS = 60.0
 """Units, of which fewer say nothing of the noise of a variance: docs/estimators.md."""
 RARE = 20.0
 """Events of which none is seen when so many are expected: exp(-20) = 2e-9, about as rare as SIX."""
