@@ -106,10 +106,8 @@ def sentence(
     those that `failed` are counted.
     """
     known = [one for one in cases if one.settled]
-    beside = [f"not ranked, as their variance is not settled: {len(cases) - len(known)}"]
-    beside = beside * (len(known) < len(cases)) + [f"not ranked, as they failed: {failed}"] * (
-        failed > 0
-    )
+    unranked = {"their variance is not settled": len(cases) - len(known), "they failed": failed}
+    beside = [f"not ranked, as {why}: {count}" for why, count in unranked.items() if count]
     told = f"At {100 * accuracy:g} %: "
     if not known:
         why = (

@@ -84,11 +84,11 @@ class Search:
 
         Raises RunError where no case reaches the accuracy, or none is known to.
         """
-        shape, side = self._voxels()
+        shape, side = self.voxels()
         majorants = majorants_of(shape)
         points = [
             {"tracker": tracker, "majorant": majorants[middle_of(majorants)], "tightness": 1}
-            for tracker in self._trackers(side)
+            for tracker in self.trackers(side)
         ]
         usual = [one | {"majorant": "global"} for one in points if one["tracker"] == USUAL]
         self._round(0, [*points, *self._global_only(points), *usual])
@@ -115,25 +115,14 @@ class Search:
             best.setdefault(by(one), one)
         return list(best.values())[:count]
 
-    def every(self) -> list[Axes]:
-        """The cases that the search is over: what a full sweep measures."""
-        shape, side = self._voxels()
-        majorants = majorants_of(shape)
-        return [
-            {"tracker": tracker, "majorant": majorant, "tightness": tightness}
-            for tracker in self._trackers(side)
-            for majorant in majorants
-            for tightness in TIGHTNESS
-        ]
-
-    def _voxels(self) -> tuple[tuple[int, ...], float]:
+    def voxels(self) -> tuple[tuple[int, ...], float]:
         """Counts along x, y, z, and the shortest side in the world."""
         keys = self.medium["volume"]
         volume = read_volume(Path(keys["file"]), keys.get("grid"))
         sides = np.linalg.norm(volume.to_world[:, :3], axis=0)
         return tuple(reversed(volume.densities.shape)), float(sides.min())
 
-    def _trackers(self, side: float) -> list[Axes]:
+    def trackers(self, side: float) -> list[Axes]:
         """Those of the estimand with their defaults; lengths in them are one voxel, and four."""
         found = []
         for tracker in self.known.trackers.values():

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from freepath import compare
 from freepath.cli import main
-from freepath.compare import trials
 from freepath.compare.pairing import Run, Side
 from freepath.results import COLUMNS, SAMPLE_COLUMNS
 from junitparser import JUnitXml
 from scipy import stats
+from support import trials
 
 RERUNS = Path(__file__).parent / "data" / "reruns.npz"
 """Seconds a sample of every round of 54 reruns of 16 cases, on two cores with a load of 1 to 14."""

@@ -122,7 +122,7 @@ def test_weights_of_a_violated_majorant_are_not_known(samples):
         ([0.5, 0.5], [0.0, 1.0]),
         ([0.99, 0.01], [0.0, 1.0]),
         (stats.poisson.pmf(np.arange(30), 4.0), 0.5 ** np.arange(30.0)),
-        (stats.poisson.pmf(np.arange(30), 1.0), 1.5 ** np.arange(30.0)),
+        (stats.poisson.pmf(np.arange(30), 1.0), 1.3 ** np.arange(30.0)),
     ],
 )
 def test_scores_of_a_finite_fourth_moment_are_known(chances, scores):

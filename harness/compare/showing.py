@@ -23,15 +23,9 @@ COLUMNS = (
     "difference", "z_score", "lookups_ratio", "p_value", "seen_from", "runs", "why",
 )  # fmt: skip
 HEADER = (
-    "verdict",
-    "case",
-    "time contender/reference",
-    "variance c/r",
-    "difference",
-    "z",
-    "lookups c/r",
+    "verdict", "case", "time contender/reference", "variance c/r", "difference", "z", "lookups c/r",
     "why",
-)
+)  # fmt: skip
 MOST_UNDECIDED = 8
 """Of more undecided cases only their number is told."""
 LIMITS = "1 is no change, above 1 the contender is slower, noisier, or looks up more"
@@ -53,16 +47,8 @@ def cells(one: Judged) -> list[str]:
     if one.time_ratio is not None:
         time = f"{one.time_ratio:.3g} ({one.time_low:.3g} to {one.time_high:.3g})"
     difference = "" if one.difference is None else f"{100 * one.difference:+.2g}%"
-    return [
-        one.verdict,
-        one.row["case"],
-        time,
-        short(one.variance_ratio),
-        difference,
-        short(one.z_score),
-        short(one.lookups_ratio),
-        one.why,
-    ]
+    numbers = short(one.variance_ratio), difference, short(one.z_score), short(one.lookups_ratio)
+    return [one.verdict, one.row["case"], time, *numbers, one.why]
 
 
 def lines(judged: Sequence[Judged], *, everything: bool) -> list[str]:
