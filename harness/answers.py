@@ -87,8 +87,10 @@ def ratio(baseline: Case, one: Case) -> tuple[float, float, float]:
 
 
 def digits(value: float) -> str:
-    """A ratio with two digits or more."""
-    return f"{value:.0f}" if value >= 9.95 else f"{value:.1f}" if value >= 0.95 else f"{value:.2g}"
+    """A ratio with two digits or three."""
+    if value >= 9.95:
+        return f"{float(f'{value:.3g}'):.0f}"
+    return f"{value:.1f}" if value >= 0.95 else f"{value:.2g}"
 
 
 def times_as_fast(baseline: Case, one: Case) -> str:

@@ -25,12 +25,12 @@ CLOSE = 0.1
 FAILED = ("invalid", "build_failed", "run_failed", "timeout", "crashed", "mismatch")
 """Statuses of cases that went wrong."""
 LEGEND = (
-    "time: device time per sample. occ.: lanes at work. rel. var.: variance of one sample\n"
-    "over the squared reference. bias: mean over rays with its 95 % interval, in brackets\n"
-    "the RMS over rays, which decides. to 1%: device time per ray to a relative RMSE of\n"
-    "1 %, ~ if it is not known to 20 %, ? if it is not known, never if the RMS of the bias\n"
-    "is larger; * the fastest, and what is not significantly slower. lookups: ~ if counted\n"
-    "over few samples. Without a reference (?) the estimate stands in for it."
+    "time: device time per sample. occ.: lanes at work. rel. var.: variance of one sample over "
+    "the squared reference. bias: mean over rays with its 95 % interval; in brackets the RMS over "
+    "rays, which decides, where it is more. to 1%: device time per ray to a relative RMSE of 1 %; "
+    "~ if it is not known to 20 %, ? if it is not known, never if the RMS of the bias is larger; "
+    "* the fastest, and what is not significantly slower. lookups: ~ if counted over few samples. "
+    "Without a reference (?) the estimate stands in for it."
 )
 
 
@@ -161,7 +161,7 @@ def bias(row: Row) -> str:
         return ""
     percent, width = (100 * x / abs(reference) for x in (value, 1.96 * number(row, "bias_stderr")))
     rms = 100 * (number(row, "bias_rms") or 0.0) / abs(reference)
-    told = f" ({rms:.1g}%)" if rms else ""
+    told = f" ({rms:.1g}%)" if rms > 1.05 * abs(percent) else ""
     if not width:
         return f"{percent:+.1g}%{told}"
     digits = max(0, 1 - math.floor(math.log10(width)))
