@@ -135,7 +135,7 @@ def execute(options: Namespace) -> int:
         options.alpha, options.factor, options.drift, times=not options.no_times
     )
     found = [compare.compare(reference, side, settings) for side in sides]
-    _write(options, wanted, reference, sides, found)
+    _write(options, wanted, reference, sides, (found, settings.to_show))
     words = {one.verdict for judged, _ in found for one in judged}
     return REGRESSION if words & set(options.fail_on) else 0
 
@@ -152,16 +152,19 @@ def _format(options: Namespace) -> str:
     return wanted
 
 
-def _write(options: Namespace, wanted: str, reference: Any, sides: list, found: list) -> None:
+def _write(
+    options: Namespace, wanted: str, reference: Any, sides: list, told: tuple[list, float]
+) -> None:
     from freepath.compare import showing
     from freepath.errors import FreepathError
 
+    found, to_show = told
     names, results = [side.name for side in sides], [judged for judged, _ in found]
     made = {
         "csv": lambda: showing.as_csv(names, results),
         "html": lambda: showing.as_html(reference.name, names, results),
         "json": lambda: showing.as_json(names, results),
-        "md": lambda: showing.as_markdown(reference.name, names, results),
+        "md": lambda: showing.as_markdown(reference.name, names, results, to_show),
     }
     path = options.output_junit
     try:
@@ -175,10 +178,10 @@ def _write(options: Namespace, wanted: str, reference: Any, sides: list, found: 
     if wanted != "text" and not options.output:
         print(made[wanted](), end="")
     else:
-        _print(options, names, found)
+        _print(options, names, found, to_show)
 
 
-def _print(options: Namespace, names: list[str], found: list) -> None:
+def _print(options: Namespace, names: list[str], found: list, to_show: float) -> None:
     from freepath.commands.common import console_of
     from freepath.compare import showing
 
@@ -187,7 +190,7 @@ def _print(options: Namespace, names: list[str], found: list) -> None:
     for name, (judged, shifts) in zip(names, found, strict=True):
         lines = showing.lines(judged, everything=options.all) if len(names) == 1 else []
         lines += showing.shift_lines(shifts)
-        lines += [f"{name}: {showing.totals(judged)}", showing.undecided(judged)]
+        lines += [f"{name}: {showing.totals(judged)}", showing.undecided(judged, to_show)]
         print("\n".join(filter(None, lines)))
     if options.output:
         print(f"wrote {options.output}")

@@ -20,7 +20,7 @@ SMALLEST = np.finfo(float).tiny
 SAMPLE = ("seed", "rays", "driver_version", "lanes", "arithmetic", "storage")
 """Where these are equal, both took the same samples: nothing is left to chance."""
 TO_SHOW = 1.05
-"""Of an undecided case it is said how many runs would show such a ratio of times."""
+"""The least ratio of times of which it is said how many runs would show it."""
 ROUNDING = 1e-6
 """Relative difference of estimates without variance that different compilers may cause."""
 
@@ -38,6 +38,11 @@ class Settings:
     judge that by the runs, where there are several, and else to take all of it for drift."""
     times: bool = True
     """Whether times are compared."""
+
+    @property
+    def to_show(self) -> float:
+        """The ratio of times of which an undecided case says how many runs would show it."""
+        return max(TO_SHOW, self.factor**2)
 
 
 @dataclass(frozen=True)
@@ -59,7 +64,7 @@ class Judged:
     seen_from: float | None = None
     """Where times are undecided: the least ratio of them that would have been seen (95 %)."""
     runs: int | None = None
-    """And how many runs a side would show a ratio of TO_SHOW; None where no number would."""
+    """And how many runs a side would show `Settings.to_show`; None where no number would."""
     why: str = ""
 
     @property
@@ -169,7 +174,7 @@ def _shown(one: Judged, pair: _Pair, settings: Settings, level: float, runs: int
         why.append("no rounds to compare times by")
     elif settings.times and not pair.time.within(limit):
         seen = _ratio(pair.time.seen_from(limit, level))
-        needed = pair.time.runs_to_show(math.log(TO_SHOW) - limit, level, runs)
+        needed = pair.time.runs_to_show(math.log(settings.to_show) - limit, level, runs)
         one = replace(one, seen_from=seen, runs=needed)
         beside = ", beside the other cases" if pair.time.shared else ""
         why.append(f"time: no change below x{seen:.3g} would have been seen{beside}")

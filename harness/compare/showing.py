@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from freepath import markdown
-from freepath.compare.judging import REGRESSIONS, TO_SHOW, VERDICTS, Judged
+from freepath.compare.judging import REGRESSIONS, VERDICTS, Judged
 from freepath.table import short
 from rich.markup import escape
 from rich.table import Table
@@ -65,13 +65,13 @@ def lines(judged: Sequence[Judged], *, everything: bool) -> list[str]:
     return found
 
 
-def undecided(judged: Sequence[Judged]) -> str:
+def undecided(judged: Sequence[Judged], to_show: float) -> str:
     """What undecided times could have shown, and what would show more; '' where there are none."""
     seen = sorted(one.seen_from for one in judged if one.seen_from is not None)
     if not seen:
         return ""
     runs = [one.runs for one in judged if one.seen_from is not None]
-    wanted = f"{100 * (TO_SHOW - 1):.0f} %"
+    wanted = f"{100 * (to_show - 1):.2g} %"
     text = f"times: no change below x{seen[0]:.3g}"
     text += f" to x{seen[-1]:.3g}, by case," if len(seen) > 1 else ""
     text += " would have been seen (95 %); "
@@ -133,12 +133,14 @@ def as_json(names: Sequence[str], results: Sequence[Sequence[Judged]]) -> str:
     return json.dumps(found, indent=1, allow_nan=False) + "\n"
 
 
-def as_markdown(reference: str, names: Sequence[str], results: Sequence[Sequence[Judged]]) -> str:
+def as_markdown(
+    reference: str, names: Sequence[str], results: Sequence[Sequence[Judged]], to_show: float
+) -> str:
     """For a pull request: what is not the same first, and the rest folded away."""
     parts = []
     for name, judged in zip(names, results, strict=True):
         title = markdown.text_of(f"{name} compared with {reference}")
-        parts += [f"**{title}: {totals(judged)}**", "", *filter(None, [undecided(judged), ""])]
+        parts += [f"**{title}: {totals(judged)}**", "", undecided(judged, to_show), ""]
         changed = [cells(one) for one in judged if one.verdict not in ("SAME", "UNDECIDED")]
         others = [cells(one) for one in judged if one.verdict in ("SAME", "UNDECIDED")]
         if changed:
