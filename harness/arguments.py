@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -50,6 +52,36 @@ def add_trackers(command: Any) -> None:
         metavar="DIR",
         help="a folder with further trackers, one .cl file each; may be repeated",
     ).complete = shtab.DIRECTORY
+
+
+def add_baseline(command: Any) -> None:
+    """--baseline, what ratios are of."""
+    command.add_argument(
+        "--baseline",
+        type=expression,
+        default="",
+        metavar="RE",
+        help="the case that ratios are of, by its name (default: delta tracking with one majorant "
+        "at tightness 1, where it is there; else the slowest that is known)",
+    )
+
+
+def expression(text: str) -> str:
+    """A regular expression, as the type of an argument."""
+    try:
+        re.compile(text)
+    except (re.error, RecursionError, OverflowError) as error:
+        raise argparse.ArgumentTypeError(f"expected a regular expression: {error}") from error
+    return text
+
+
+def number_or_percent(text: str) -> float:
+    """A number, or a share written as `5%` or `5 %`; NaN where it is none."""
+    plain = text.strip().removesuffix("%")
+    try:
+        return float(plain) / (100.0 if plain != text.strip() else 1.0)
+    except ValueError:
+        return math.nan
 
 
 def positive(text: str) -> float:

@@ -171,11 +171,13 @@ class Standing:
 
     def __str__(self) -> str:
         """One sentence."""
+        if self.own and "t1" in self.own["unknown"]:
+            return "not known: the variance of its scores is not settled"
         if self.own is None:
             return "never reaches 1 %: its bias is larger"
         mine = f"1 % after {seconds(self.own['t1'])} ({self.own['method']})"
-        if self.other is None:
-            return f"pays: {mine}, and none of its relatives reaches it"
+        if self.other is None or "t1" in self.other["unknown"]:
+            return f"pays: {mine}, and none of its relatives is known to reach it"
         factor = self.other["t1"] / self.own["t1"]
         noise = math.hypot(known_to(self.own, "t1"), known_to(self.other, "t1"))
         text = f"{mine}; {self.other['method']} after {seconds(self.other['t1'])}"
@@ -199,5 +201,6 @@ def standings(report: Report, tracker: Tracker) -> list[Standing]:
 
 
 def _soonest(rows: Sequence[dict[str, Any]]) -> dict[str, Any] | None:
+    """The fastest that is known; else one that is not known, if it is there."""
     reaching = [row for row in rows if isinstance(row["t1"], float)]
-    return min(reaching, key=lambda row: row["t1"], default=None)
+    return min(reaching, key=lambda row: ("t1" in row["unknown"], row["t1"]), default=None)

@@ -93,7 +93,8 @@ bias_rms float - root mean square over rays of the bias with its noise taken out
     explains it
 z_score float - bias over bias_stderr; empty where nothing varies
 variance float - of one sample, averaged over rays
-variance_noise float - half its 95 % interval over rounds, relative
+variance_noise float - half its 95 % interval over rounds, relative; empty where [few high scores
+    carry it](estimators.md#when-a-variance-is-not-known), with a remark in `reason`
 rmse float - of one sample: rmse^2 = variance + bias_rms^2
 inv_efficiency_lookups float - variance x lookups per sample: lower is better
 inv_efficiency_s float s variance x seconds per sample: lower is better

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from freepath.errors import RunError
 from freepath.runner import LAUNCH_S, SAMPLES_PER_UNIT, Round, Runner
-from freepath.stats import Moments
+from freepath.stats import Moments, Tail
 from freepath.stopping import Rule, Stopping
 
 ROUND_S = 0.2
@@ -20,7 +20,10 @@ ROUND_S = 0.2
 COUNTING_S = 0.05
 """Device time that counting should take at least."""
 EXACTLY_COUNTED = 64
-"""Samples of each ray that are counted where the number of samples is given."""
+"""Samples of each ray that are counted at least where the number of samples is given."""
+COUNTED_IN_ALL = 1 << 16
+"""And of all rays together, as far as there are so many: lookups are then known to half a percent,
+if they vary as much as they are."""
 ENOUGH_S = 0.01
 """Device time from which on a run tells what a sample costs."""
 MOST_SAMPLES = 1 << 30
@@ -76,6 +79,7 @@ class Measurement:
     rounds: list[Round] = field(default_factory=list)
     counted: Round | None = None
     moments: Moments | None = None
+    tail: Tail = field(default_factory=Tail)
     stopped: str = ""
     """Why it ended: precise, budget, samples or failed; '' while it goes on."""
     spent_s: float = 0.0
@@ -89,7 +93,9 @@ class Measurement:
 
     def add(self, one: Round) -> None:
         """Add a measured round; its moments are kept merged only, or they would fill the memory."""
-        self.rounds.append(replace(one, moments=None, means=None))
+        self.rounds.append(replace(one, moments=None, means=None, squares=None))
+        if one.squares is not None and one.samples == self.rounds[0].samples:
+            self.tail.add(one.squares)
         self.spent_s += one.time_wall_s
         self.moments = self.moments.merged(one.moments) if self.moments else one.moments
 
@@ -139,7 +145,8 @@ class Bench:
         if self.rule.samples is None:
             return self.run_for(self.counting, COUNTING_S)
         self._first_run(self.counting)
-        return self.run(self.counting, 0, Shape(1, min(self.rule.samples, EXACTLY_COUNTED)))
+        wanted = max(EXACTLY_COUNTED, math.ceil(COUNTED_IN_ALL / self.counting.rays))
+        return self.run(self.counting, 0, Shape(1, min(self.rule.samples, wanted)))
 
     def _calibrated(self) -> Shape:
         rays, one = self.timed.rays, self.run_for(self.timed, ENOUGH_S)

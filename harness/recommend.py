@@ -1,4 +1,4 @@
-"""Which tracker and majorant reach an accuracy soonest in a volume: successive halving."""
+"""Which tracker and majorant are the fastest to an accuracy in a volume: successive halving."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from freepath import api, plan
+from freepath import answers, api, plan
 from freepath.catalog import ANY, Catalog
 from freepath.device import Device
 from freepath.errors import NothingMatchedError, RunError
 from freepath.ladder import Ladder
 from freepath.scene.volumes import read_volume
-from freepath.sweep import Clock, Listener
-from freepath.table import number, uncertainty
+from freepath.sweep import Clock, Listener, Sweep
+from freepath.table import failures, number, uncertainty
 from scipy import stats
 
 SEED = 7
@@ -32,26 +32,29 @@ TRACKERS, CASES, FINALISTS = 5, 5, 5
 """How many are left after each round."""
 PRECISION = ({"error": "10%", "time_noise": "10%"},) * 3 + ({"error": "1%", "time_noise": "1%"},)
 LEAST_S = 0.05
+USUAL: dict[str, Any] = {"delta": {}}
+"""The tracker that, with one majorant, ratios are of: measured too, where it is searched."""
 CONFIG = "recommended.yaml"
 Axes = dict[str, Any]
 
 
 @dataclasses.dataclass(frozen=True)
 class Finding:
-    """A case, and the device seconds that a ray of it takes to the accuracy asked for."""
+    """A case with its device seconds per ray to the accuracy asked for, and how to measure it."""
 
-    name: str
+    case: answers.Case
     axes: Axes
     """Tracker, majorant and tightness as a config has them."""
-    time_s: float
-    """Infinite where the bias alone is larger."""
-    noise: float
-    """Half the 95 % interval of the time, relative to it."""
 
     @property
-    def soonest_s(self) -> float:
-        """The lower end of its interval: what is not known well is not given up for it."""
-        return self.time_s * max(0.0, 1.0 - self.noise)
+    def rank(self) -> tuple[bool, float]:
+        """By its time; what is not known comes behind all that is."""
+        return not self.case.settled, self.case.time_s
+
+    @property
+    def hope(self) -> tuple[bool, float]:
+        """By the lower end of its interval: what is known roughly is not given up for that."""
+        return not self.case.settled, self.case.time_s * max(0.0, 1.0 - self.case.noise)
 
 
 @dataclasses.dataclass
@@ -73,44 +76,53 @@ class Search:
     only: str = ""
     """A regular expression that names of trackers match."""
     measured: int = 0
+    found: dict[str, Finding] = dataclasses.field(default_factory=dict)
+    """By the name of the case, the last known of all rounds; without those that went wrong."""
 
     def run(self) -> list[Finding]:
-        """The finalists, soonest first; raises RunError where no case reaches the accuracy."""
-        shape, side = self._voxels()
+        """The finalists, the fastest first.
+
+        Raises RunError where no case reaches the accuracy, or none is known to.
+        """
+        shape, side = self.voxels()
         majorants = majorants_of(shape)
         points = [
             {"tracker": tracker, "majorant": majorants[middle_of(majorants)], "tightness": 1}
-            for tracker in self._trackers(side)
+            for tracker in self.trackers(side)
         ]
-        found = self._round(0, [*points, *self._global_only(points)])
-        best = _few(found, TRACKERS, by=lambda one: next(iter(one.axes["tracker"])))
-        found = self._round(
+        usual = [one | {"majorant": "global"} for one in points if one["tracker"] == USUAL]
+        self._round(0, [*points, *self._global_only(points), *usual])
+        best = self._few(TRACKERS, by=lambda one: next(iter(one.axes["tracker"])))
+        self._round(
             1, [one.axes | {"majorant": m, "tightness": 1} for one in best for m in majorants]
         )
-        best = _few(found, CASES)
-        found = self._round(2, [one.axes | {"tightness": t} for one in best for t in TIGHTNESS])
-        found = self._round(3, [one.axes for one in _few(found, FINALISTS)])
-        return sorted(found, key=lambda one: one.time_s)
+        self._round(2, [one.axes | {"tightness": t} for one in self._few(CASES) for t in TIGHTNESS])
+        self._round(3, [one.axes for one in self._few(FINALISTS)])
+        finalists = sorted(self.found.values(), key=lambda one: one.rank)[:FINALISTS]
+        if not finalists[0].case.settled:
+            raise RunError(
+                "the fastest is not known: of no case is the variance settled; give it more time "
+                f"by --budget; what was measured is in {self.folder}"
+            )
+        return finalists
 
-    def every(self) -> list[Axes]:
-        """The cases that the search is over: what a full sweep measures."""
-        shape, side = self._voxels()
-        majorants = majorants_of(shape)
-        return [
-            {"tracker": tracker, "majorant": majorant, "tightness": tightness}
-            for tracker in self._trackers(side)
-            for majorant in majorants
-            for tightness in TIGHTNESS
-        ]
+    def _few(
+        self, count: int, by: Callable[[Finding], str] = lambda one: one.case.case
+    ) -> list[Finding]:
+        """The best of all rounds, each of another kind."""
+        best: dict[str, Finding] = {}
+        for one in sorted(self.found.values(), key=lambda one: one.hope):
+            best.setdefault(by(one), one)
+        return list(best.values())[:count]
 
-    def _voxels(self) -> tuple[tuple[int, ...], float]:
+    def voxels(self) -> tuple[tuple[int, ...], float]:
         """Counts along x, y, z, and the shortest side in the world."""
         keys = self.medium["volume"]
         volume = read_volume(Path(keys["file"]), keys.get("grid"))
         sides = np.linalg.norm(volume.to_world[:, :3], axis=0)
         return tuple(reversed(volume.densities.shape)), float(sides.min())
 
-    def _trackers(self, side: float) -> list[Axes]:
+    def trackers(self, side: float) -> list[Axes]:
         """Those of the estimand with their defaults; lengths in them are one voxel, and four."""
         found = []
         for tracker in self.known.trackers.values():
@@ -134,27 +146,24 @@ class Search:
             if "grid" not in self.known.trackers[name].majorants
         ]
 
-    def _round(self, turn: int, points: Sequence[Axes]) -> list[Finding]:
-        """Measure cases; those that reach the accuracy."""
+    def _round(self, turn: int, points: Sequence[Axes]) -> None:
+        """Measure cases, and note those that reach the accuracy."""
         self.folder.mkdir(parents=True, exist_ok=True)
         seconds = max(LEAST_S, self.budget_s * SHARES[turn] / len(points))
         stop = PRECISION[turn] | {"at_most": f"{seconds:.3g} s"}
         config = self.folder / f"round-{turn + 1}.yaml"
         config.write_text(self.config_text(points, stop), "utf-8")
-        rows, by_id = self.measure(config)
-        rows = [row for row in rows if row["status"] == "ok"]
-        self.measured += len(rows)
-        found = [self._finding(by_id[row["case_id"]], row) for row in rows]
-        reaching = [one for one in found if one and math.isfinite(one.time_s)]
-        if not reaching:
-            raise RunError(
-                f"no case reaches a relative error of {100 * self.accuracy:g} %: the transmittance "
-                f"is 0, or biases are larger; see {config.with_suffix('')}"
-            )
-        return reaching
+        sweep = self.measure(config)
+        by_id = {case.case_id: case for case in sweep.cases}
+        rows = sweep.folder.rows()
+        self.measured += sum(row["status"] == "ok" for row in rows)
+        for row in rows:
+            self.note(row, axes_of(by_id[row["case_id"]]))
+        if not self.found:
+            raise RunError(self._why_none(rows, sweep.folder.folder))
 
-    def measure(self, config: Path) -> tuple[list[dict[str, str]], dict[str, plan.Case]]:
-        """Run a config into the folder beside it: its rows, and its cases by their ids."""
+    def measure(self, config: Path) -> Sweep:
+        """Run a config into the folder beside it."""
         sweep = api.sweep(
             config,
             config.with_suffix(""),
@@ -164,11 +173,28 @@ class Search:
             clock=self.clock,
         )
         sweep.run()
-        return sweep.folder.rows(), {case.case_id: case for case in sweep.cases}
+        return sweep
 
-    def _finding(self, case: plan.Case, row: dict[str, str]) -> Finding | None:
-        found = needed(row, self.accuracy)
-        return Finding(case.name, axes_of(case), *found) if found else None
+    def note(self, row: dict[str, str], axes: Axes) -> None:
+        """Keep what a row of summary.csv says of a case; what went wrong once is out."""
+        time = needed(row, self.accuracy) if row["status"] == "ok" else None
+        one = answers.case_of(row, time) if time else None
+        old = self.found.get(row["case"])
+        if one is None:
+            self.found.pop(row["case"], None)
+        elif one.settled or old is None or not old.case.settled:
+            self.found[row["case"]] = Finding(one, axes)
+
+    def _why_none(self, rows: Sequence[dict[str, str]], folder: Path) -> str:
+        failed = failures(rows)
+        told = [f"{len(failed)} failed; {one['status']}: {one['reason']}" for one in failed[:1]]
+        if len(failed) == len(rows):
+            return f"no case could be measured: {told[0]}"
+        why = (
+            f"no case reaches a relative error of {100 * self.accuracy:g} %: the transmittance "
+            f"is 0, or biases are larger; see {folder}"
+        )
+        return "; ".join([why, *told])
 
     def config_text(self, points: Sequence[Axes], stop: Axes) -> str:
         """A config of these cases, in YAML (JSON is YAML)."""
@@ -190,7 +216,7 @@ class Search:
         """Write the config that measures the finalists again, the best first."""
         path = self.folder / CONFIG
         text = self.config_text([one.axes for one in finalists], PRECISION[-1] | {"at_most": "5 s"})
-        what = f"{self.estimand} to {100 * self.accuracy:g} %: the first case is soonest"
+        what = f"{self.estimand} to {100 * self.accuracy:g} %: the first case is the fastest"
         path.write_text(f"# {what}; the others came next.\n{text}", encoding="utf-8")
         return path
 
@@ -235,18 +261,8 @@ def axes_of(case: plan.Case) -> Axes:
     return {"tracker": tracker, "majorant": majorant, "tightness": tightness}
 
 
-def _few(
-    found: Sequence[Finding], count: int, by: Callable[[Finding], str] = lambda one: one.name
-) -> list[Finding]:
-    """The best by the lower end of their interval, each of another kind."""
-    best: dict[str, Finding] = {}
-    for one in sorted(found, key=lambda one: one.soonest_s):
-        best.setdefault(by(one), one)
-    return list(best.values())[:count]
-
-
-def surely(first: Finding, second: Finding) -> float:
-    """The chance that the first is the sooner one, errors of both taken as normal."""
+def surely(first: answers.Case, second: answers.Case) -> float:
+    """The chance that the first is the faster one, errors of both taken as normal."""
     spread = math.hypot(first.time_s * first.noise, second.time_s * second.noise) / 1.96
     if not spread:
         return 1.0

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from freepath import reading
 from freepath.columns import COLUMNS, CONFIRM_COLUMNS, SAMPLE_COLUMNS, TEXTS
 from freepath.errors import FreepathError
 from freepath.journal import Journal
@@ -89,6 +90,7 @@ class ResultFolder:
             kept = [row for row in old if stands(row) or _of(row, PLACE) not in places]
             sessions = {_of(row, SESSION) for row in kept}
             rounds = self._old(SAMPLES, SAMPLE_COLUMNS)
+            reading.agree(self.folder / SUMMARY, old, rounds, SESSION)
             self._rewrite(SUMMARY, COLUMNS, kept)
             rounds = [row for row in rounds if _of(row, SESSION) in sessions]
             self._rewrite(SAMPLES, SAMPLE_COLUMNS, rounds)
@@ -175,10 +177,9 @@ class ResultFolder:
     def read_run(self) -> dict[str, Any]:
         """What run.json says; empty where there is none that can be read."""
         try:
-            facts = json.loads((self.folder / RUN).read_text("utf-8"))
-        except (OSError, ValueError):
+            return reading.facts(self.folder / RUN)
+        except FreepathError:
             return {}
-        return facts if isinstance(facts, dict) else {}
 
     def write_log(self, name: str, text: str) -> Path:
         """Write a compiler's log beside the rows."""
@@ -245,18 +246,18 @@ def _text(value: Any) -> Any:
 def read_rows(path: Path, columns: tuple[str, ...] = COLUMNS) -> list[Row]:
     """Read a CSV of a run; a last row that was cut off by a crash is left out.
 
-    Raises FreepathError where the file cannot be read or is not of this schema version.
+    Raises FreepathError, with file, line and column, for what no run has written.
     """
-    try:
-        # a row may have been cut off within a character
-        with path.open(newline="", encoding="utf-8", errors="replace") as file:
-            reader = csv.DictReader(file)
-            rows = [row for row in reader if None not in row.values() and None not in row]
-    except (OSError, csv.Error) as error:
-        raise FreepathError(f"{path}: cannot be read: {error}") from error
-    if tuple(reader.fieldnames or ()) != columns:
-        raise FreepathError(f"{path}: its columns are not those of schema version {SCHEMA_VERSION}")
-    return rows
+    return reading.rows(path, columns, TEXTS, SCHEMA_VERSION)
+
+
+def read_result(folder: Path) -> tuple[list[Row], list[Row]]:
+    """The rows of cases and of rounds; raises FreepathError where they do not agree."""
+    cases, samples = read_rows(folder / SUMMARY), folder / SAMPLES
+    rounds = read_rows(samples, SAMPLE_COLUMNS) if samples.exists() else []
+    if samples.exists():
+        reading.agree(folder / SUMMARY, cases, rounds, SESSION)
+    return cases, rounds
 
 
 def records(rows: Iterable[Row]) -> list[dict[str, Any]]:

@@ -81,6 +81,9 @@ def measured_row(
         held = result if claimed is None else accuracy(found.moments, claimed)
     row = row | _costs(found, row["lanes"])
     row["status"], row["reason"] = verdict(tracker, row, held, largest_score)
+    if row["status"] == "ok" and not found.tail.told:
+        few = f"its variance is not known: {found.tail.units:.0f} units carry what is seen of it"
+        row["reason"] = "; ".join(filter(None, [row["reason"], few]))
     if row["status"] != "invalid":
         row |= _errors(result, found, row)
     return row
@@ -116,7 +119,7 @@ def _costs(found: Measurement, lanes: int) -> dict[str, Any]:
 
 
 def _errors(result: Accuracy, found: Measurement, row: dict[str, Any]) -> dict[str, Any]:
-    seconds = row["time_per_sample_s"]
+    seconds, told = row["time_per_sample_s"], found.tail.told
     return {
         "estimate": result.estimate,
         "reference": result.reference,
@@ -125,7 +128,7 @@ def _errors(result: Accuracy, found: Measurement, row: dict[str, Any]) -> dict[s
         "bias_rms": result.bias_rms,
         "z_score": result.z_score,
         "variance": result.variance,
-        "variance_noise": _finite(relative_half_width(found.variances)),
+        "variance_noise": _finite(relative_half_width(found.variances)) if told else None,
         "rmse": result.rmse,
         "inv_efficiency_lookups": result.variance * row["lookups_per_sample"],
         "inv_efficiency_s": result.variance * seconds,

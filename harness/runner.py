@@ -10,7 +10,7 @@ import numpy as np
 import pyopencl as cl
 from freepath import limits
 from freepath.device import COUNTERS, Device, Program, WorkItems, scalar_type
-from freepath.stats import Moments, merge_blocks
+from freepath.stats import Moments, merge_blocks, squares_of
 
 STEP_CAP = 1 << 20
 """Steps after which a path is cut off and counted as truncated."""
@@ -77,6 +77,8 @@ class Round:
     means: np.ndarray | None = None
     """(blocks, rays) or (blocks, rays, channels): the mean of each block of samples; let go of like
     the moments."""
+    squares: np.ndarray | None = None
+    """(blocks, rays): squared deviations of each block of samples; let go of like the moments."""
     recorded: np.ndarray | None = None
     """(units, samples, 3 + 2 channels): t, weight, escaped, lookups so far in the unit, score; then
     weight and score of each further channel."""
@@ -198,6 +200,8 @@ class Runner:
         time_wall = time.perf_counter() - started
         means, m2 = self._moments(outputs, blocks)
         moments = merge_blocks(means, m2, samples)
+        single = slice(None) if self.channels == 1 else slice(None, -1)
+        squares = squares_of(means[..., single], m2[..., single], samples)
         moments = moments.flat if self.channels == 1 else moments.of_channels
         means = means[..., 0] if self.channels == 1 else means[..., :-1]
         counters = self._read("counters", outputs, (units, len(COUNTERS)), np.uint32)
@@ -218,6 +222,7 @@ class Runner:
             timing_source="device" if time_device > 0 else "wall",
             moments=moments,
             means=means,
+            squares=squares,
             recorded=recorded,
         )
 

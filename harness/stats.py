@@ -15,6 +15,8 @@ SIGNIFICANT = 4.0
 """Standard deviations beyond which the biases of single rays are more than the noise in them."""
 SIX = 6.0
 """Standard errors beyond which what claims to be unbiased is not: by chance 2 in 1e9."""
+CARRIERS = 60.0
+"""Units, of which fewer say nothing of the noise of a variance: docs/estimators.md."""
 RARE = 20.0
 """Events of which none is seen when so many are expected: exp(-20) = 2e-9, about as rare as SIX."""
 
@@ -75,6 +77,15 @@ def merge_blocks(mean: np.ndarray, m2: np.ndarray, samples: int) -> Moments:
     return Moments(samples * len(mean), merged, m2.sum(0) + between)
 
 
+def squares_of(mean: np.ndarray, m2: np.ndarray, samples: int) -> np.ndarray:
+    """Sums of squared deviations from the mean of the ray, (blocks, rays), over channels.
+
+    Of blocks of equally many samples; mean and m2 have the shape (blocks, rays, channels).
+    """
+    mean, m2 = mean.astype(np.float64), m2.astype(np.float64)
+    return (m2 + samples * (mean - mean.mean(0)) ** 2).sum(-1)
+
+
 def relative_half_width(values: Sequence[float]) -> float:
     """Half the 95 % interval of the mean of independent values, relative to it; inf below two.
 
@@ -87,6 +98,49 @@ def relative_half_width(values: Sequence[float]) -> float:
         return 0.0
     quantile = float(special.stdtrit(len(values) - 1, 0.5 + CONFIDENCE / 2))
     return quantile * spread / math.sqrt(len(values)) / abs(mean) if mean else math.inf
+
+
+class Tail:
+    """How many parts of a measurement its knowledge of the variance rests on.
+
+    A unit of samples of a ray gives the sum of squared deviations of its scores. How far these sums
+    spread tells how well the variance is known, unless that spread is itself the work of a few
+    units with rare high scores: then it tells what these did, and nothing of those yet rarer. D
+    being the squared deviation of a sum from the mean of its ray, (sum of D)^2 / (sum of D^2) units
+    carry the spread: a third of them for normal sums. Where the fourth moment of scores is infinite
+    the largest D is a share of all that does not fall with their number (Embrechts, Klueppelberg,
+    Mikosch 1997, 6.2.6), and so the spread stays with a few.
+    """
+
+    def __init__(self) -> None:
+        self._start: np.ndarray | None = None
+        self._sums: np.ndarray | None = None
+        self._count = 0
+
+    def add(self, squares: np.ndarray) -> None:
+        """Add units of equally many samples, (units, rays): their sums of squared deviations."""
+        if self._start is None:
+            self._start, self._sums = squares.mean(0), np.zeros((4, squares.shape[1]))
+        from_start = squares - self._start
+        self._sums += [(from_start**power).sum(0) for power in (1, 2, 3, 4)]
+        self._count += len(squares)
+
+    @property
+    def units(self) -> float:
+        """So many units carry the spread of the variance; inf where there is none."""
+        if self._sums is None:
+            return math.inf
+        first, second, third, fourth = self._sums / self._count
+        spread = second - first**2
+        square = fourth - 4.0 * first * third + 6.0 * first**2 * second - 3.0 * first**4
+        if not square.sum() > 0:
+            return math.inf
+        return float(self._count * np.maximum(spread, 0.0).sum() ** 2 / square.sum())
+
+    @property
+    def told(self) -> bool:
+        """Whether the spread over rounds says how well the variance is known."""
+        return self.units >= CARRIERS
 
 
 @dataclass(frozen=True)

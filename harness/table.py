@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 from rich.markup import escape
 from rich.table import Table
@@ -13,15 +13,24 @@ Row = dict[str, str]
 PREFIXES = ((1e-12, "p"), (1e-9, "n"), (1e-6, "u"), (1e-3, "m"), (1.0, ""))
 ROUGH = 0.2
 """A time to an accuracy of which half the 95 % interval is more, relative to it, is marked."""
+UNSETTLED = 0.5
+"""And one of which it is more is not known: its interval is threefold wide, or holds 0. Such a case
+is ranked behind all others, and is never the fastest."""
+COUNTED = 10_000
+"""Lookups counted over fewer samples are marked: 1 % of noise, if they vary as much as they are."""
+NARROW = 100
+"""Columns of a terminal below which a table leaves out what explains times."""
 CLOSE = 0.1
 """A prediction that is no further from the measurement, relative to it, holds."""
 FAILED = ("invalid", "build_failed", "run_failed", "timeout", "crashed", "mismatch")
 """Statuses of cases that went wrong."""
 LEGEND = (
-    "time: device time a sample. occ.: lanes at work. rel. var.: variance of one sample over the\n"
-    "squared reference. bias: of the reference, with its 95 % interval. to 1%: device time a ray\n"
-    "for a relative RMSE of 1 %, ~ if it is not known to 20 %; * the soonest, and what is not\n"
-    "significantly later. Without a reference (?) the estimate stands in for it."
+    "time: device time per sample. occ.: lanes at work. rel. var.: variance of one sample over "
+    "the squared reference. bias: mean over rays with its 95 % interval; in brackets the RMS over "
+    "rays, which decides, where it is more. to 1%: device time per ray to a relative RMSE of 1 %; "
+    "~ if it is not known to 20 %, ? if it is not known, never if the RMS of the bias is larger; "
+    "* the fastest, and what is not significantly slower. lookups: ~ if counted over few samples. "
+    "Without a reference (?) the estimate stands in for it."
 )
 
 
@@ -91,12 +100,19 @@ def uncertainty(
     return math.hypot(*(1.0 if noise is None else noise for noise in noises))
 
 
+def settled(uncertain: float) -> bool:
+    """Whether a time that is known to so much (half its 95 % interval, relative) can be ranked."""
+    return uncertain <= UNSETTLED
+
+
 def soonest(times: Sequence[tuple[float, float]]) -> list[int]:
     """The places of the least of (time, its uncertainty), and of those not significantly later.
 
-    In the order of times, the least first.
+    In the order of times, the least first. Of those that are settled: what is not known is neither
+    the least nor as good as it.
     """
-    order = sorted(range(len(times)), key=lambda place: times[place])
+    order = [place for place in range(len(times)) if settled(times[place][1])]
+    order.sort(key=lambda place: times[place])
     widths = [time * relative for time, relative in times]
     return [
         place
@@ -106,9 +122,10 @@ def soonest(times: Sequence[tuple[float, float]]) -> list[int]:
 
 
 def marked(value: float | None, uncertain: float) -> str:
-    """A time to an accuracy, with "~" if it is known roughly."""
-    finite = value is not None and math.isfinite(value)
-    return ("~" if finite and uncertain > ROUGH else "") + seconds(value)
+    """A time to an accuracy, with "~" if it is known roughly, "?" if it is not known."""
+    if value is None or math.isinf(value):
+        return seconds(value)
+    return ("" if uncertain <= ROUGH else "~" if settled(uncertain) else "?") + seconds(value)
 
 
 def _time_to_1pct(row: Row) -> tuple[float, float]:
@@ -126,17 +143,23 @@ def best_of(rows: Iterable[Row]) -> list[Row]:
 
 
 def bias(row: Row) -> str:
-    """The bias relative to the reference, with half its 95 % interval if it has one."""
+    """The mean bias relative to the reference, with half its 95 % interval if it has one.
+
+    Behind it in brackets its RMS over rays, which decides whether an accuracy is reached; nothing
+    where noise explains that.
+    """
     value, reference = number(row, "bias"), number(row, "reference")
     if value is None or not reference:
         return ""
     percent, width = (100 * x / abs(reference) for x in (value, 1.96 * number(row, "bias_stderr")))
+    rms = 100 * (number(row, "bias_rms") or 0.0) / abs(reference)
+    told = f" ({rms:.1g}%)" if rms > 1.05 * abs(percent) else ""
     if not width:
-        return f"{percent:+.1g}%"
+        return f"{percent:+.1g}%{told}"
     digits = max(0, 1 - math.floor(math.log10(width)))
     if digits > 4 or abs(percent) >= 1e4 or width >= 1e4:
-        return f"{percent:+.1g}±{width:.1g}%"
-    return f"{percent:+.{digits}f}±{width:.{digits}f}%"
+        return f"{percent:+.1g}±{width:.1g}%{told}"
+    return f"{percent:+.{digits}f}±{width:.{digits}f}%{told}"
 
 
 def _method(row: Row) -> str:
@@ -166,23 +189,23 @@ def _ladder_cell(row: Row) -> str:
     return marked(*_time_to_1pct(row)) if row["time_to_1pct_s"] else ""
 
 
-def _cells(row: Row, *, best: bool) -> list[str]:
-    lanes = _lanes(row)
+def _cells(row: Row, *, best: bool) -> dict[str, str]:
+    """By the name of the column."""
+    named = {"tracker": escape(_method(row)), "lanes": _lanes(row)}
     if row["status"] != "ok":
-        status = f"[bold red]{escape(row['status'])}[/]"
-        return [escape(_method(row)), lanes, *[""] * 4, status, ""]
+        return named | {"bias (RMS)": f"[bold red]{escape(row['status'])}[/]"}
     variance, reference = number(row, "variance"), number(row, "reference")
     reference = number(row, "estimate") if reference is None else reference
-    return [
-        escape(_method(row)),
-        lanes,
-        short(number(row, "lookups_per_sample")),
-        seconds(number(row, "time_per_sample_s")),
-        f"{100 * number(row, 'lane_occupancy'):.0f}%",
-        short(variance / reference**2 if reference else None),
-        bias(row),
-        _ladder_cell(row) + (" [bold green]*[/]" if best else "  "),
-    ]
+    few = (number(row, "counted_samples") or COUNTED) < COUNTED
+    root = math.sqrt(variance) / reference if reference else 0.0
+    return named | {
+        "lookups": "~" * few + short(number(row, "lookups_per_sample")),
+        "time": seconds(number(row, "time_per_sample_s")),
+        "occ.": f"{100 * number(row, 'lane_occupancy'):.0f}%",
+        "rel. var.": short(root * root) if reference else "",
+        "bias (RMS)": bias(row),
+        "to 1%  ": _ladder_cell(row) + (" [bold green]*[/]" if best else "  "),
+    }
 
 
 def lit(row: Row) -> bool:
@@ -223,19 +246,46 @@ def _settled(row: Row) -> bool:
     return high - measured <= CLOSE * measured and measured - low <= CLOSE * measured
 
 
-def table_of(rows: list[Row]) -> Table:
-    """A table of one group's rows; what reaches 1 % soonest is marked with a star."""
+def _rank(row: Row) -> tuple[int, float]:
+    """The fastest to 1 % first; then what is not known, what never gets there, and what failed."""
+    if row["status"] != "ok":
+        return 4, 0.0
+    if not row["time_to_1pct_s"]:
+        return 3, 0.0
+    time, uncertain = _time_to_1pct(row)
+    return 2 if math.isinf(time) else 0 if settled(uncertain) else 1, time
+
+
+def table_of(
+    rows: list[Row], ratio: Callable[[Row], str] | None = None, width: int = NARROW
+) -> Table:
+    """A table of one group's rows, the fastest first; what reaches 1 % soonest has a star.
+
+    `ratio` tells how many times as fast as the baseline a row is. Lanes are a column where they
+    differ, else in the title.
+    """
     first = rows[0]
     reference = next((short(number(row, "reference"), 4) for row in rows if row["reference"]), "?")
     rays = "1 ray" if first["rays"] == "1" else f"{first['rays']} rays"
     light = f" in {first['light']}, {bounces(first)}" if lit(first) else ""
     title = f"{first['estimand']} of {first['medium']}{light}, {rays}, reference {reference}"
+    alike = len({_lanes(row) for row in rows}) == 1
+    title += f", {_lanes(first)} lanes" if alike else ""
     table = Table(title=escape(title), title_justify="left", title_style="bold", box=None)
-    table.padding = (0, 1, 0, 0)
-    table.add_column("tracker", overflow="fold")
-    for name in ("lanes", "lookups", "time", "occ.", "rel. var.", "bias", "to 1%  "):
-        table.add_column(name, justify="right", no_wrap=True)
+    table.padding, table.min_width = (0, 1, 0, 0), min(width, len(title))
+    names = ["tracker", "lanes", "lookups", "time", "occ.", "rel. var.", "bias (RMS)", "to 1%  "]
+    left_out = {"lanes"} if alike else set()
+    left_out |= {"occ.", "rel. var."} if width < NARROW else set()
+    names = [name for name in names if name not in left_out]
+    for name in names:
+        left = name == "tracker"
+        table.add_column(
+            name, justify="left" if left else "right", overflow="fold", no_wrap=not left
+        )
+    if ratio:
+        table.add_column("x baseline", justify="right", no_wrap=True)
     best = best_of(rows)
-    for row in rows:
-        table.add_row(*_cells(row, best=row in best))
+    for row in sorted(rows, key=_rank):
+        cells = _cells(row, best=row in best)
+        table.add_row(*(cells.get(name, "") for name in names), *([ratio(row)] if ratio else []))
     return table

@@ -194,7 +194,7 @@ def test_a_run_prints_a_table_and_names_its_files(call, work, selector, device):
     (folder,) = (work / "results").iterdir()
     assert device.info.name in out
     assert "load" in out
-    assert re.search(r"^analytic +\d+ +0 ", out, re.MULTILINE)
+    assert re.search(r"^analytic +~0 ", out, re.MULTILINE)
     assert re.search(
         r"device time \d+ % of [\d.]+ s outside compilation; compilation [\d.]+ s", out
     )

@@ -146,8 +146,16 @@ def test_an_exact_number_of_samples_is_counted_exactly():
     """However fast the machine is, so that two runs can be compared count by count."""
     for seconds in (1e-8, 1e-6):
         bench = bench_of(MadeUp(10, seconds), samples=1000)
-        assert bench.measurement.counted.samples == 10 * measure.EXACTLY_COUNTED
+        assert bench.measurement.counted.samples == 10 * 1000
+    many = bench_of(MadeUp(4096), samples=1000).measurement.counted
+    assert many.samples == 4096 * measure.EXACTLY_COUNTED
     assert bench_of(MadeUp(10), samples=7).measurement.counted.samples == 70
+
+
+def test_a_single_ray_is_counted_over_many_samples():
+    """64 samples of it, which vary as much as they are, would tell lookups to 12 %."""
+    counted = bench_of(MadeUp(1), samples=200_000).measurement.counted
+    assert counted.samples == measure.COUNTED_IN_ALL
 
 
 def test_a_cheap_case_is_counted_for_a_while():

@@ -27,8 +27,10 @@ ORDER = (
     ("runner",),
     ("measure", "journal"),
     ("geometry",),
+    ("reading",),
     ("results",),
-    ("rows", "table", "binding", "confirm", "pictures"),
+    ("rows", "table", "markdown", "binding", "confirm", "pictures"),
+    ("answers",),
     ("equal_time", "report", "compare"),
     ("jobs",),
     ("run_file",),
@@ -44,10 +46,24 @@ PLACE = {name: place for place, names in enumerate(ORDER) for name in names}
 LONGEST = 330
 ONLY_CSV = {
     "table": {"errors"},
+    "answers": {"table"},
+    "markdown": set(),
     # the pictures of a run are files beside its CSV
-    "report": {"errors", "ladder", "results", "table", "report", "version", "pictures"},
-    "compare": {"errors", "results", "table", "compare"},
-    "results": {"errors", "journal", "columns"},
+    "report": {
+        "answers",
+        "errors",
+        "ladder",
+        "markdown",
+        "pictures",
+        "reading",
+        "report",
+        "results",
+        "table",
+        "version",
+    },
+    "compare": {"errors", "markdown", "reading", "results", "table", "compare"},
+    "results": {"errors", "journal", "columns", "reading"},
+    "reading": {"errors"},
     "journal": {"errors"},
 }
 """What modules may import that work on rows of CSV and on nothing else."""

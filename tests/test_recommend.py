@@ -6,8 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from freepath import recommend
+from freepath.answers import Case
 from freepath.cli import main
-from freepath.recommend import Finding, majorants_of, middle_of, surely
+from freepath.recommend import majorants_of, middle_of, surely
+from freepath.results import COLUMNS
 
 
 @pytest.fixture
@@ -38,10 +40,10 @@ def test_named_with_a_config_that_measures_it_again(call, cloud, monkeypatch):
     code, text = call(cloud, "--accuracy", "5%", *options)
     assert code == 0, text
     # at the same majorant ratio tracking has the smaller variance, and here by far
-    (best,) = re.findall(r"soonest: (\S+)", text)
+    (best,) = re.findall(r"fastest: (\S+)", text)
     assert "/ratio/" in best
-    assert re.search(r"of device time a ray \(95 %: .* to .*\)", text)
-    assert re.search(r"runner-up: \S+\n +[\d.]+ .*s, [\d.]+ times as long", text)
+    assert re.search(r"of device time per ray \(95 %: .* to .*\)", text)
+    assert re.search(r"second: \S+\n +[\d.]+ .*s, [\d.]+ times as long", text)
     assert main(["run", "out/recommended.yaml", "-N"]) == 0
     monkeypatch.undo()
     again, _ = call(cloud, *options)
@@ -99,9 +101,63 @@ def test_majorants_follow_the_voxels():
 
 def test_how_sure():
     def taking(time, noise):
-        return Finding("x", {}, time, noise)
+        return Case("x", "t", "t", "none", None, time, noise, 0.0)
 
     assert surely(taking(1, 0.1), taking(1, 0.1)) == pytest.approx(0.5)
     # 1.96 standard errors apart
     assert surely(taking(1, 0.1), taking(1.1, 0.0)) == pytest.approx(0.975, abs=1e-3)
     assert surely(taking(1, 0.0), taking(1, 0.0)) == 1
+
+
+def row_of(name, time, noise="0.01", **changes):
+    row = dict.fromkeys(COLUMNS, "") | {"status": "ok", "tracker": name, "majorant": "none"}
+    row |= {"case": f"transmittance/m/{name}/auto/strict", "reference": "0.5", "estimate": "0.5"}
+    row |= {"time_per_sample_s": str(time / 1e4), "variance": "0.25", "bias_rms": "0"}
+    return row | {"time_noise": "0.01", "variance_noise": noise} | changes
+
+
+def noted(*rows):
+    """A search that has seen these rows, one after the other."""
+    search = recommend.Search(*[None] * 4, "transmittance", 0.01, 1.0, (), None)
+    for row in rows:
+        search.note(row, {"tracker": {row["tracker"]: {}}})
+    return search
+
+
+def test_what_is_not_known_pushes_nothing_out():
+    """Six cases whose intervals hold 0, and two that are known: these go on first."""
+    lucky = [row_of(f"lucky{i}", 1e-6, noise="1.5") for i in range(6)]
+    search = noted(*lucky, row_of("march", 3e-4), row_of("ratio", 2e-4))
+    assert [one.case.tracker for one in search._few(3)] == ["ratio", "march", "lucky0"]
+
+
+def test_what_went_wrong_in_a_later_round_never_competes():
+    fast = row_of("fast", 1e-5)
+    for status in ("mismatch", "invalid", "build_failed", "timeout"):
+        search = noted(fast, row_of("slow", 1e-3), fast | {"status": status})
+        assert [one.case.tracker for one in search._few(5)] == ["slow"]
+
+
+def test_the_last_word_is_of_all_rounds():
+    """What a first round knew stays known, whatever a later one makes of it or does not ask."""
+    first, later = row_of("march", 2e-7), row_of("march", 1e-3, noise="2.0")
+    search = noted(first, later, row_of("weighted", 16e-3))
+    best, other = search._few(2)
+    assert (best.case.tracker, other.case.tracker) == ("march", "weighted")
+    assert best.case.time_s == pytest.approx(2e-7, rel=0.01)
+    again = noted(first, row_of("march", 3e-7))
+    assert again._few(1)[0].case.time_s == pytest.approx(3e-7, rel=0.01)
+
+
+def test_the_compilers_error_is_told():
+    rows = [
+        row_of(name, 1, status="build_failed", reason="error: unknown target CPU 'generic'")
+        for name in "abc"
+    ]
+    told = noted()._why_none(rows, Path("out"))
+    assert told == (
+        "no case could be measured: 3 failed; build_failed: error: unknown target CPU 'generic'"
+    )
+    told = noted()._why_none([*rows[:1], row_of("march", 1, bias_rms="1")], Path("out"))
+    assert told.startswith("no case reaches a relative error of 1 %")
+    assert "1 failed; build_failed: error: unknown target" in told

@@ -12,7 +12,7 @@ from freepath.cli import main
 from freepath.errors import FreepathError
 from freepath.report import load, write
 from freepath.report.pictures import picture
-from freepath.report.text import markdown
+from freepath.report.text import markdown, sentences
 from freepath.results import COLUMNS, CONFIRM_COLUMNS
 from support.many import many
 
@@ -38,6 +38,7 @@ ROW = dict.fromkeys(COLUMNS, "") | {
     "lane_occupancy": "0.9",
     "time_noise": "0.02",
     "variance_noise": "0.02",
+    "estimate": "0.5",
     "reference": "0.5",
     "variance": "0.25",
     "bias": "0.0",
@@ -74,6 +75,7 @@ def result_of(folder, rows, confirmed=()):
 
 CONFIRMED = dict.fromkeys(CONFIRM_COLUMNS, "") | {
     "case_id": "0",
+    "case": ROW["case"],
     "device": "a [b] <c>",
     "platform": "p",
     "reference": "0.5",
@@ -179,15 +181,45 @@ def test_markdown_names_the_soonest(result):
 
 def test_what_is_known_roughly_is_marked_and_ties_are_counted(tmp_path):
     """Other times of the ladder are those of a single sample, in which there is no variance."""
-    rough = {"variance_noise": "0.5", "time_to_10pct_s": "1e-06", "time_to_1pct_s": "0.0099"}
+    rough = {"variance_noise": "0.4", "time_to_10pct_s": "1e-06", "time_to_1pct_s": "0.0099"}
     rows = [row_of(1, "delta", **rough), row_of(2, "ratio"), row_of(3, "split", seconds=1e-5)]
     report = load([result_of(tmp_path / "result", rows)])
     assert [row["rough"] for row in report.rows] == [["t1"], [], []]
     lines = markdown(report).splitlines()
     soonest = next(line for line in lines if line.startswith("| transmittance, cloud"))
-    assert "| ~9.9 ms, delta, global x1 (not significantly later: 1 more) |" in soonest
+    assert "| ~9.9 ms, delta, global x1 (not significantly slower: 1 more) |" in soonest
     (case,) = (line for line in lines if line.startswith("| delta"))
     assert case.endswith("| 1 us | ~9.9 ms | never |")
+
+
+def test_what_is_not_known_is_not_the_fastest(tmp_path):
+    """An interval that holds 0, at a sixteenth of the time: the answer is what is known."""
+    rows = [
+        row_of(1, "delta"),
+        row_of(2, "ratio", seconds=1e-6 / 16, variance_noise="1.43"),
+        row_of(3, "split", seconds=5e-7),
+        row_of(4, "march", seconds=1e-9, status="mismatch", reason="off"),
+    ]
+    report = load([result_of(tmp_path / "result", rows)])
+    (line,) = sentences(report)
+    assert line == (
+        "transmittance, cloud-64, 64 rays: At 1 %: split, global, tightness 1 is 2.0 (1.9 to 2.1) "
+        "times as fast as delta, global, tightness 1; not ranked, as their variance is not "
+        "settled: 1; not ranked, as they failed: 1."
+    )
+    text = markdown(report)
+    assert text.splitlines()[2] == "- " + line
+    assert "| 5 ms, split, global x1 |" in text
+    (case,) = (one for one in text.splitlines() if one.startswith("| ratio"))
+    assert "| ?625 us |" in case
+    (only,) = sentences(load([result_of(tmp_path / "other", [rows[1], rows[3]])]))
+    assert "At 1 %: the variance of no case is settled; measure longer; not ranked" in only
+
+
+def test_the_baseline_can_be_chosen(result, capsys):
+    assert main(["report", str(result), "--baseline", "t4/delta", "--format", "md"]) == 0
+    first = capsys.readouterr().out.splitlines()[2]
+    assert "is 3.0 (2.9 to 3.1) times as fast as delta, global, tightness 4" in first
 
 
 def test_markdown_and_what_is_asked_for_is_printed(result, capfdbinary):

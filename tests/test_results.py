@@ -1,10 +1,13 @@
 import csv
 import json
 import math
+import re
 
 import numpy as np
 import pytest
+from freepath.cli import main
 from freepath.errors import FreepathError
+from freepath.reading import MEASURED
 from freepath.results import (
     COLUMNS,
     KEY,
@@ -24,7 +27,7 @@ def row_of(case="a", **given):
         "schema_version": 1,
         "run_id": "run1",
         "case_id": case,
-        "case": f"name of {case}",
+        "case": f"transmittance/m/{case}/auto/strict",
         "status": "ok",
         "reason": "",
         "device": "thing",
@@ -32,15 +35,18 @@ def row_of(case="a", **given):
         "driver_version": "1",
         "config_sha256": "c",
         "source_sha256": "s",
+        "majorant": "none",
         "estimate": 0.1,
     }
+    row |= dict.fromkeys(MEASURED[:4], 1) | dict.fromkeys(MEASURED[5:], 0.5)
     return row | given
 
 
 def rounds_of(row, count=2):
     empty = dict.fromkeys(SAMPLE_COLUMNS)
     shared = {column: row[column] for column in empty if column in row}
-    return [empty | shared | {"round": number} for number in range(count)]
+    empty |= shared | {"samples": 1, "time_device_s": 0.1, "time_wall_s": 0.1}
+    return [empty | {"round": number} for number in range(count)]
 
 
 def written(folder, *rows):
@@ -86,7 +92,7 @@ def test_cells_are_empty_or_full_numbers(tmp_path):
     given = {
         "estimate": 0.1 + 0.2,
         "bias": None,
-        "variance": math.nan,
+        "variance_noise": math.nan,
         "time_to_1pct_s": math.inf,
         "rmse": np.float64(1e-300),
         "rays": np.int64(7),
@@ -94,7 +100,7 @@ def test_cells_are_empty_or_full_numbers(tmp_path):
     }
     (row,) = written(tmp_path, row_of(**given)).rows()
     assert float(row["estimate"]) == 0.1 + 0.2
-    assert (row["bias"], row["variance"], row["time_to_1pct_s"]) == ("", "", "inf")
+    assert (row["bias"], row["variance_noise"], row["time_to_1pct_s"]) == ("", "", "inf")
     assert (row["rmse"], row["rays"], row["z_score"]) == ("1e-300", "7", "0.5")
 
 
@@ -219,8 +225,9 @@ def test_a_missing_line_end_does_not_join_rows(tmp_path):
     (tmp_path / SUMMARY).write_bytes((tmp_path / SUMMARY).read_bytes().rstrip(b"\n"))
     results, done = resumed(tmp_path, row_of("a"), row_of("b"))
     results.append(row_of("b"))
-    assert done == {key_of(row_of("a"))}
-    assert [row["case_id"] for row in results.rows()] == ["a", "b"]
+    # whether its last cell is whole cannot be told
+    assert done == set()
+    assert [row["case_id"] for row in results.rows()] == ["b"]
 
 
 def test_files_of_another_version_are_refused(tmp_path):
@@ -277,3 +284,89 @@ def test_columns():
     assert len(set(SAMPLE_COLUMNS)) == len(SAMPLE_COLUMNS)
     assert set(COLUMNS) > TEXTS
     assert set(KEY) > set(PLACE)
+
+
+def damaged(folder, name, old, new):
+    """A result of two cases with a change in one of its files."""
+    told = {"rays": 4, "samples_per_ray": 50, "rounds": 2}
+    results = ResultFolder(folder)
+    results.open([])
+    for row in (row_of("a", **told), row_of("b", **told)):
+        results.append(row, [one | {"samples": 100} for one in rounds_of(row)])
+    results.write_run({"sessions": []})
+    results.close()
+    text = (folder / name).read_text()
+    assert old in text
+    (folder / name).write_bytes(text.replace(old, new, 1).encode("utf-8", "surrogateescape"))
+
+
+DAMAGES = [
+    (
+        SUMMARY,
+        ",0.1,",
+        ",abc,",
+        f"summary.csv:2: column {COLUMNS.index('estimate') + 1}, estimate: expected a number,",
+    ),
+    (SUMMARY, ",0.1,", ",nan,", "estimate: expected a number, got 'nan'"),
+    (SUMMARY, ",0.1,", ",1e400,", "estimate: expected a number, got '1e400'"),
+    (SUMMARY, ",0.1,", ",0_1,", "estimate: expected a number, got '0_1'"),
+    (SUMMARY, ",0.1,", ",,", "estimate: expected a number, as the status is ok"),
+    (
+        SUMMARY,
+        ",0.1,,",
+        ",",
+        f"summary.csv:2: expected {len(COLUMNS)} cells, as the first line has, got fewer",
+    ),
+    (SUMMARY, ",thing,", ",\x1b]0;x\x07,", "summary.csv:2: column 7, device: holds a control"),
+    (SUMMARY, ",none,", ",grid-8,", "summary.csv:2: column 16, tightness: expected a number, as"),
+    (SUMMARY, "/a/auto/strict", "", "summary.csv:2: column 4, case: expected estimand/medium/"),
+    (SUMMARY, ",ok,", ",fine,", "summary.csv:2: column 5, status: expected one of ok, skipped"),
+    (SUMMARY, ",2,", ",3,", "summary.csv:2: transmittance/m/a/auto/strict: expected 3 rounds of"),
+    ("samples.csv", ",100,", ",-100,", "samples.csv:2: column 7, samples: expected a whole number"),
+    (
+        "samples.csv",
+        ",0.1,",
+        ",-0.1,",
+        "samples.csv:2: column 9, time_device_s: expected 0 or more",
+    ),
+    ("samples.csv", ",0.1,", ",,", "samples.csv:2: column 9, time_device_s: expected a number"),
+    ("samples.csv", ",1,100,", ",99999,100,", "expected 2 rounds of 200 samples in all beside it"),
+    ("samples.csv", ",100,", ",10,", "expected 2 rounds of 200 samples in all beside it, found 2"),
+    (
+        "samples.csv",
+        "b,thing,maker,1,100,,0.1,0.1,,0.1,0.5\n",
+        "b,th",
+        "expected 2 rounds of 200 samples in all beside",
+    ),
+]
+
+
+@pytest.mark.parametrize(("name", "old", "new", "told"), DAMAGES)
+def test_what_no_run_has_written_is_refused_in_one_line(tmp_path, capsys, name, old, new, told):
+    """By all that read results; a row that a crash cut off is none of it."""
+    damaged(tmp_path / "out", name, old, new)
+    for command in (["report", "out"], ["compare", "out", "out"], ["report", "out", "out"]):
+        words = [str(tmp_path / word) if word == "out" else word for word in command]
+        assert main(words) == 2
+        error = capsys.readouterr().err
+        assert told in error
+        assert len(error.splitlines()) == 1
+    with pytest.raises(FreepathError, match=re.escape(told)):
+        resumed(tmp_path / "out", row_of("a"), row_of("b"))
+
+
+@pytest.mark.parametrize("text", ["", "{", "[" * 100_000, '{"x": NaN}', "[]", "\ufeff{}"])
+def test_a_damaged_run_json_is_refused(tmp_path, capsys, text):
+    damaged(tmp_path / "out", "run.json", "{", "{")
+    (tmp_path / "out/run.json").write_text(text)
+    for command in ("report", "compare"):
+        assert main([command, str(tmp_path / "out"), str(tmp_path / "out")]) == 2
+        error = capsys.readouterr().err
+        assert "run.json: " in error
+        assert len(error.splitlines()) == 1
+
+
+def test_an_empty_summary_is_refused(tmp_path):
+    (tmp_path / SUMMARY).write_text("")
+    with pytest.raises(FreepathError, match="its columns are not those of schema version 5"):
+        resumed(tmp_path)

@@ -294,6 +294,23 @@ def test_a_thick_medium_is_no_mismatch(go):
     assert float(regular["bias"]) == pytest.approx(0, abs=1e-3 * math.exp(-60))
 
 
+def test_a_variance_of_rare_high_weights_is_not_known(go):
+    """weighted_delta at tightness 0.5: the fourth moment of its weights is exp(26) and more."""
+    text = (
+        "name: x\nrays: {single: {origin: [0, 0.5, 0.5], direction: [1, 0, 0]}}\n"
+        "matrix: {medium: {homogeneous: {sigma_t: 2.3}}, tightness: 0.5, "
+        "tracker: [weighted_delta, delta]}\nstop: {samples: 400000}\n"
+    )
+    code, _ = go(text=text)
+    assert code == 0
+    weighted, plain = sorted(rows().values(), key=lambda row: row["tracker"], reverse=True)
+    assert weighted["variance_noise"] == ""
+    assert "its variance is not known" in weighted["reason"]
+    assert 0 < float(plain["variance_noise"]) < 0.2
+    # of a single ray so many are counted that lookups are known: majorant x length, 1.15
+    assert float(weighted["counted_samples"]) == 65536
+
+
 def test_a_majorant_that_does_not_bound_is_reported(go):
     code, _ = go("-a", "tightness=0.5", "-a", "tracker=delta", "-R", "homogeneous")
     assert code == 0

@@ -6,10 +6,13 @@ import pytest
 from freepath.stats import (
     Accuracy,
     Moments,
+    Tail,
     accuracy,
     merge_blocks,
     relative_half_width,
+    squares_of,
 )
+from scipy import stats
 
 
 def moments_of(scores):
@@ -78,6 +81,76 @@ def test_half_width_covers_as_often_as_it_says():
         for mean, row in zip(means, draws, strict=True)
     ]
     assert np.mean(inside) == pytest.approx(0.95, abs=4 * math.sqrt(0.95 * 0.05 / 4000))
+
+
+def tail_of(random, chances, scores, samples=1000):
+    """The tail of 4000 units of scores, and how well it is said that their variance is known."""
+    tail, variances = Tail(), []
+    for _ in range(5):
+        counts = random.multinomial(samples, chances, size=(200, 4))
+        mean = counts @ scores / samples
+        m2 = (counts * (scores - mean[..., None]) ** 2).sum(-1)
+        tail.add(squares_of(mean[..., None], m2[..., None], samples))
+        variances.append((m2.sum() + samples * ((mean - mean.mean()) ** 2).sum()) / counts.sum())
+    return tail, relative_half_width(variances)
+
+
+@pytest.mark.parametrize("samples", [100, 300, 1000, 3000, 10_000])
+def test_weights_of_a_violated_majorant_are_not_known(samples):
+    """weighted_delta at tightness 0.5: weights (-3)^k, k Poisson with a third of the mean.
+
+    Their moments are exp(mean (sum of 1/3 (-3)^p - 1)) in closed form, mean = majorant x length.
+    One standard error of the variance is far more than the variance, whatever rounds say.
+    """
+    random, mean, known = np.random.default_rng(5), 1.0, 0
+    levels = np.arange(60)
+    chances = stats.poisson.pmf(levels, mean / 3)
+    second, fourth = (math.exp(mean * (3.0 ** (power - 1) - 1.0)) for power in (2, 4))
+    first = math.exp(-2.0 * mean)
+    variance = second - first**2
+    error = math.sqrt(fourth / (4000 * samples)) / variance
+    assert error > 1.0
+    for _ in range(40):
+        tail, noise = tail_of(random, chances / chances.sum(), (-3.0) ** levels, samples=samples)
+        known += tail.told and noise < 1.0
+    assert known <= 3  # of 40; by rounds alone all of them are known to a few percent
+
+
+@pytest.mark.parametrize(
+    ("chances", "scores"),
+    [
+        ([0.5, 0.5], [0.0, 1.0]),
+        ([0.99, 0.01], [0.0, 1.0]),
+        (stats.poisson.pmf(np.arange(30), 4.0), 0.5 ** np.arange(30.0)),
+        (stats.poisson.pmf(np.arange(30), 1.0), 1.3 ** np.arange(30.0)),
+    ],
+)
+def test_scores_of_a_finite_fourth_moment_are_known(chances, scores):
+    random, chances = np.random.default_rng(6), np.array(chances)
+    for _ in range(20):
+        tail, noise = tail_of(random, chances / chances.sum(), np.array(scores))
+        assert tail.told
+        assert noise < 0.1
+
+
+def test_what_does_not_vary_is_known():
+    tail = Tail()
+    assert tail.told
+    tail.add(np.ones((3, 2)))
+    assert tail.units == math.inf
+
+
+def test_a_single_high_score_carries_all():
+    squares = np.random.default_rng(7).gamma(50.0, size=(1000, 3))
+    tail = Tail()
+    tail.add(squares)
+    assert tail.units == pytest.approx(1000, rel=0.15)  # a third of 3000
+    other = Tail()
+    squares[3, 1] += 1e6
+    for part in np.split(squares, 4):
+        other.add(part)
+    assert other.units == pytest.approx(1.0, rel=0.02)
+    assert not other.told
 
 
 def test_accuracy_of_few_numbers():

@@ -147,3 +147,14 @@ def test_relatives_are_those_alike(file):
     near = [other.name for other in candidate.relatives(known, tracker)]
     assert "ratio" in near
     assert "march" not in near
+
+
+def test_what_is_not_known_does_not_pay():
+    """The own case a thousand times as fast, of an interval that holds 0, or a relative's."""
+    base = {"tn": 0.01, "vn": 0.01, "t": 1e-9, "unknown": [], "method": "m"}
+    known, lucky = base | {"t1": 1e-3}, base | {"t1": 1e-6, "vn": 1.5, "unknown": ["t1"]}
+    told = str(candidate.Standing("q", candidate._soonest([lucky]), known))
+    assert told == "not known: the variance of its scores is not settled"
+    assert candidate._soonest([lucky, known]) is known
+    told = str(candidate.Standing("q", known, candidate._soonest([lucky])))
+    assert told.endswith("none of its relatives is known to reach it")

@@ -52,8 +52,8 @@ def print_records(records: list[dict[str, Any]], *, as_json: bool) -> int:
     return 0
 
 
-def console_of(*, stderr: bool = False) -> Console:
-    """A console; one that is no terminal has no width that a table should be folded to."""
+def console_of(*, stderr: bool = False, width: int = 160) -> Console:
+    """A console; one that is no terminal is so wide."""
     from rich.console import Console
 
     class Plain(Console):
@@ -64,4 +64,34 @@ def console_of(*, stderr: bool = False) -> Console:
     apart = stderr and sys.stderr.isatty()
     given = {"file": os.fdopen(os.dup(2), "w")} if apart else {"stderr": stderr}
     console = Plain(**given)
-    return console if console.is_terminal else Plain(**given, width=160)
+    return console if console.is_terminal else Plain(**given, width=width)
+
+
+def print_tables(console: Console, rows: list[dict[str, str]], load: float, baseline: str) -> None:
+    """The tables, and what each of them answers."""
+    from freepath import answers, environment, table
+
+    told = []
+    for device, members in table.by_device(rows).items():
+        console.print(f"{device}\n{environment.processor()}, load {load:.2f}", markup=False)
+        groups = table.groups(members)
+        for group in groups:
+            cases = [one for one in map(answers.case_of, group) if one]
+            base = answers.baseline_of(cases, baseline)
+
+            def ratio(row: dict[str, str], base: Any = base) -> str:
+                one = answers.case_of(row)
+                known = one and base and one.settled
+                return answers.digits(answers.ratio(base, one)[0]) if known else ""
+
+            console.print("", table.table_of(group, ratio, console.width))
+            failed = len(table.failures(group))
+            line = answers.sentence(cases, 0.01, baseline, failed)
+            told.append(f"{group[0]['medium']}: {line}" if len(groups) > 1 else line)
+    for reason, count in table.skipped(rows).items():
+        noun = "case" if count == 1 else "cases"
+        console.print(f"skipped {count} {noun}: {reason}", highlight=False, markup=False)
+    console.print(f"\n{table.LEGEND}\n", highlight=False)
+    for line in told:
+        console.print(line, highlight=False, markup=False)
+    console.print()

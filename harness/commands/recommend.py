@@ -1,25 +1,31 @@
-"""`freepath recommend`: which tracker and majorant are soonest in a volume of one's own."""
+"""`freepath recommend`: which tracker and majorant are the fastest in a volume of one's own."""
 
 from __future__ import annotations
 
 import argparse
-import re
 from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import shtab
-from freepath.arguments import add_device, add_trackers, positive
+from freepath.arguments import (
+    add_baseline,
+    add_device,
+    add_trackers,
+    expression,
+    number_or_percent,
+    positive,
+)
 
 if TYPE_CHECKING:
-    from freepath.recommend import Finding
+    from freepath.answers import Case
 
 
 def add(commands: Any) -> None:
     """Declare its arguments."""
     recommend = commands.add_parser(
         "recommend",
-        help="find the tracker and majorant that are soonest in a volume",
+        help="find the tracker and majorant that are the fastest in a volume",
         description="Measure trackers, majorants and tightness in a volume, ever fewer of them "
         "ever longer, and say which is the first to reach an accuracy, how sure that is, and "
         "what comes next. Writes a config that measures them again.",
@@ -63,21 +69,18 @@ def add(commands: Any) -> None:
     recommend.add_argument(
         "-R",
         "--include",
-        type=_expression,
+        type=expression,
         default="",
         metavar="RE",
         help="only trackers whose name matches",
     )
+    add_baseline(recommend)
     add_device(recommend, "part of the name, platform or driver of the device")
     add_trackers(recommend)
 
 
 def _accuracy(text: str) -> float:
-    percent = text.strip().endswith("%")
-    try:
-        value = float(text.strip().removesuffix("%")) / (100 if percent else 1)
-    except ValueError:
-        value = 0.0
+    value = number_or_percent(text)
     if not 1e-6 <= value < 1.0:
         raise argparse.ArgumentTypeError(
             f"expected a relative error such as 1% or 0.01, from 1e-6 to below 1, got '{text}'"
@@ -85,17 +88,9 @@ def _accuracy(text: str) -> float:
     return value
 
 
-def _expression(text: str) -> str:
-    try:
-        re.compile(text)
-    except (re.error, RecursionError, OverflowError) as error:
-        raise argparse.ArgumentTypeError(f"expected a regular expression: {error}") from error
-    return text
-
-
 def execute(options: Namespace) -> int:
     """Run it; returns the exit code."""
-    from freepath import catalog, recommend
+    from freepath import answers, catalog, recommend
     from freepath.commands.common import console_of, volume_of
     from freepath.commands.run import _shown_progress
     from freepath.errors import UsageError
@@ -131,7 +126,11 @@ def execute(options: Namespace) -> int:
         f"{device.info.label}",
         **told,
     )
-    for line in told_of(finalists):
+    cases = [one.case for one in search.found.values()]
+    for line in [
+        *told_of([one.case for one in finalists]),
+        answers.sentence(cases, options.accuracy, options.baseline),
+    ]:
         console.print(line, **told)
     console.print(
         f"{search.measured} cases measured in {clock.outside_s:.0f} s, and {clock.build_s:.0f} s "
@@ -141,7 +140,7 @@ def execute(options: Namespace) -> int:
     return 0
 
 
-def told_of(finalists: list[Finding]) -> list[str]:
+def told_of(finalists: list[Case]) -> list[str]:
     """The best, how sure that is, and what the others take."""
     from freepath.recommend import surely
     from freepath.table import seconds
@@ -149,13 +148,13 @@ def told_of(finalists: list[Finding]) -> list[str]:
     best, *others = finalists
     low, high = (best.time_s * max(0.0, 1 + sign * best.noise) for sign in (-1, 1))
     lines = [
-        f"soonest: {best.name}",
-        f"  {seconds(best.time_s)} of device time a ray (95 %: {seconds(low)} to {seconds(high)})",
+        f"fastest: {best.case}",
+        f"  {seconds(best.time_s)} of device time per ray "
+        f"(95 %: {seconds(low)} to {seconds(high)})",
     ]
     for place, one in enumerate(others):
-        what = "runner-up" if place == 0 else "then"
-        lines.append(
-            f"{what}: {one.name}\n  {seconds(one.time_s)}, {one.time_s / best.time_s:.2f} times as "
-            f"long; that it is later is {100 * surely(best, one):.0f} % sure"
-        )
+        what = "second" if place == 0 else "then"
+        line = f"{seconds(one.time_s)}, {one.time_s / best.time_s:.2f} times as long; "
+        sure = f"that it is slower is {100 * surely(best, one):.0f} % sure"
+        lines += [f"{what}: {one.case}", f"  {line}{sure if one.settled else 'not known'}"]
     return lines

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import shtab
+from freepath.arguments import add_baseline
 
 if TYPE_CHECKING:
     from freepath.report import Report
@@ -19,8 +20,8 @@ def add(commands: Any) -> None:
         "report",
         help="show what accuracy costs in time",
         description="Write one HTML file that shows what accuracy costs in time, for one result or "
-        "several side by side, and print which case is soonest. Or write it as Markdown, or one of "
-        "its charts as a picture.",
+        "several side by side, and print which case is the fastest. Or write it as Markdown, or "
+        "one of its charts as a picture.",
         allow_abbrev=False,
     )
     report.add_argument(
@@ -46,24 +47,28 @@ def add(commands: Any) -> None:
         help="which chart a picture is of: cost (default), pareto, tightness-time, "
         "tightness-lookups, lights, lookups, occupancy, devices, confirm",
     )
+    add_baseline(report)
 
 
 def execute(options: Namespace) -> int:
     """Run it; returns the exit code."""
     from freepath import report
     from freepath.commands.common import console_of
-    from freepath.report.text import summary
+    from freepath.report.text import sentences, summary
 
+    asked = options.result, options.output, options.format, options.chart, options.baseline
     markdown = options.format == "md" and not options.output
     if markdown or options.output == report.STANDARD_OUTPUT:
-        found, data, _ = report.made(options.result, options.output, options.format, options.chart)
+        found, data, _ = report.made(*asked)
         sys.stdout.flush()
         sys.stdout.buffer.write(data)
         _say_what_is_left_out(found)
         return 0
-    found, path = report.write(options.result, options.output, options.format, options.chart)
+    found, path = report.write(*asked)
     console = console_of()
     console.print(summary(found))
+    for line in sentences(found, options.baseline):
+        console.print(line, highlight=False, markup=False, soft_wrap=True)
     console.print(f"wrote {path}", highlight=False, markup=False, soft_wrap=True)
     _say_what_is_left_out(found)
     return 0

@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import shtab
-from freepath.arguments import add_config, add_device
-from freepath.commands.common import cases_of, console_of
-from freepath.errors import FAILED, INTERRUPTED, USAGE
+from freepath.arguments import add_baseline, add_config, add_device
+from freepath.commands.common import cases_of, console_of, print_tables
+from freepath.errors import FAILED, INTERRUPTED, USAGE, UsageError
 
 if TYPE_CHECKING:
     from freepath.device import DeviceInfo
@@ -74,6 +74,7 @@ def add(commands: Any) -> None:
         "fastest of a short calibration)",
     )
     run.add_argument("--json", action="store_true", help="print the rows as JSON, nothing else")
+    add_baseline(run)
     # given to the process of a driver: who started it shows the rows of all
     run.add_argument("--rows-only", action="store_true", help=argparse.SUPPRESS)
 
@@ -84,6 +85,8 @@ def execute(options: Namespace) -> int:
     loaded, known, cases = cases_of(options)
     if options.show_only:
         return _show_only(options, cases)
+    if options.baseline and not any(re.search(options.baseline, case.name) for case in cases):
+        raise UsageError(f"--baseline {options.baseline}: no case has a name that matches")
     from freepath import api, environment, results, selection
     from freepath.sweep import Clock
 
@@ -197,10 +200,10 @@ def _show(
     if options.json:
         print(json.dumps(records(rows), indent=1))
         return _say_failures(rows)
-    console = console_of()
+    console = console_of(width=80)
     for told in folder.read_run().get("inputs") or ():
         console.print(told, highlight=False, markup=False, soft_wrap=True)
-    _print_tables(console, rows, load)
+    print_tables(console, rows, load, options.baseline)
     if sweep:
         _print_times(console, sweep)
     if options.confirm:
@@ -272,19 +275,6 @@ def _say_failures(rows: list[dict[str, str]]) -> int:
             f"freepath: {status}: {reason}: {several if names[1:] else names[0]}", file=sys.stderr
         )
     return FAILED if causes else 0
-
-
-def _print_tables(console: Console, rows: list[dict[str, str]], load: float) -> None:
-    from freepath import environment, table
-
-    for device, members in table.by_device(rows).items():
-        console.print(f"{device}\n{environment.processor()}, load {load:.2f}", markup=False)
-        for group in table.groups(members):
-            console.print("", table.table_of(group))
-    for reason, count in table.skipped(rows).items():
-        noun = "case" if count == 1 else "cases"
-        console.print(f"skipped {count} {noun}: {reason}", highlight=False, markup=False)
-    console.print(f"\n{table.LEGEND}\n", highlight=False)
 
 
 def _print_times(console: Console, sweep: Sweep) -> None:

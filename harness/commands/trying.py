@@ -134,7 +134,7 @@ def _measure(
     """Measure it beside its relatives, write the report and say where it pays."""
     from freepath import api, candidate, report, table
     from freepath.commands.run import _shown_progress
-    from freepath.report.text import summary
+    from freepath.report.text import sentences, summary
 
     known, tracker = trackers
     with _shown_progress(console) as listener:
@@ -144,6 +144,8 @@ def _measure(
     found, page = report.write([folder.folder], None, "html")
     console.print("", summary(found), "")
     told = {"highlight": False, "markup": False, "soft_wrap": True}
+    for line in sentences(found):
+        console.print(line, **told)
     for standing in candidate.standings(found, tracker):
         console.print(f"{standing.question}:\n  {standing}", **told)
     console.print(f"wrote {page}", **told)

@@ -1,6 +1,16 @@
 """Comparisons of results: what became faster, slower, noisier or different, from CSV alone."""
 
-from freepath.compare.judging import VERDICTS, Judged, Settings, compare
-from freepath.compare.pairing import Side, load, refuse
+from freepath.compare.judging import REGRESSIONS, VERDICTS, Judged, Settings, compare
+from freepath.compare.pairing import Side, load, refuse, unpaired
 
-__all__ = ["VERDICTS", "Judged", "Settings", "Side", "compare", "load", "refuse"]
+__all__ = [
+    "REGRESSIONS",
+    "VERDICTS",
+    "Judged",
+    "Settings",
+    "Side",
+    "compare",
+    "load",
+    "refuse",
+    "unpaired",
+]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections import defaultdict
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,7 +9,8 @@ from typing import Any
 
 import numpy as np
 from freepath.errors import FreepathError
-from freepath.results import RUN, SAMPLE_COLUMNS, SAMPLES, SUMMARY, read_rows
+from freepath.reading import facts
+from freepath.results import RUN, SUMMARY, read_result
 from freepath.table import Row
 
 Key = tuple[str, ...]
@@ -65,11 +65,10 @@ def load(path: Path) -> Side:
 
 
 def _run(folder: Path) -> Run:
-    rows = {_key(row): row for row in read_rows(folder / SUMMARY) if row["status"] != "skipped"}
+    cases, rounds = read_result(folder)
+    rows = {_key(row): row for row in cases if row["status"] != "skipped"}
     times: dict[Key, dict[int, float]] = defaultdict(dict)
     variances: dict[Key, list[float]] = defaultdict(list)
-    samples = folder / SAMPLES
-    rounds = read_rows(samples, SAMPLE_COLUMNS) if samples.is_file() else []
     sizes: dict[Key, str] = {}
     for row in rounds:
         key = _key(row)
@@ -91,10 +90,9 @@ def _key(row: Row) -> Key:
 
 def _host(folder: Path) -> dict[str, Any]:
     try:
-        sessions = json.loads((folder / RUN).read_text("utf-8"))["sessions"]
-        host = sessions[-1]["host"]
+        host = facts(folder / RUN)["sessions"][-1]["host"]
         return {name: host[name] for name in HOST}
-    except (OSError, ValueError, LookupError, TypeError):
+    except (LookupError, TypeError):
         return {}
 
 
@@ -106,6 +104,31 @@ def refuse(reference: Side, contender: Side) -> str:
         if len(found) > 1:
             return f"they are from different machines: {name} is {' and '.join(found)}"
     return ""
+
+
+PAIRED = ("case_id", "device", "platform")
+NAMED = ("estimand", "medium", "rays", "light", "tracker", "majorant", "tightness", "lanes", "seed")
+NAMED += ("arithmetic", "storage", "params")
+
+
+def unpaired(reference: Side, contender: Side) -> str:
+    """Why no case of two sides pairs: what they have not in common; '' where some pair."""
+    sides = [list(side.rows.values()) for side in (reference, contender)]
+    if reference.rows.keys() & contender.rows.keys():
+        return ""
+    values = [{name: {row[name] for row in rows} for name in (*PAIRED, *NAMED)} for rows in sides]
+    other = [name for name in values[0] if not values[0][name] & values[1][name]]
+    other = [name for name in other if name != "case_id"] if "case_id" in other else other
+    told = [
+        f"{name} is {_listed(values[0][name])} and {_listed(values[1][name])}" for name in other
+    ]
+    why = "; ".join(told[:3]) or "their case_ids differ"
+    return f"no case of one pairs with a case of the other: {why}"
+
+
+def _listed(values: set[str]) -> str:
+    first = sorted(values)[:2]
+    return " or ".join(f"'{one}'" for one in first) + (", ..." if len(values) > 2 else "")
 
 
 def scenes(run: Run) -> dict[Key, list[Key]]:

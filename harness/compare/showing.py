@@ -5,31 +5,29 @@ from __future__ import annotations
 import csv
 import html
 import io
+import json
 import math
 from collections import Counter
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
-from freepath.compare.judging import VERDICTS, Judged
+from freepath import markdown
+from freepath.compare.judging import REGRESSIONS, VERDICTS, Judged
 from freepath.table import short
 from rich.markup import escape
 from rich.table import Table
 
 COLUMNS = (
     "verdict", "case", "device", "time_ratio", "time_low", "time_high", "variance_ratio",
-    "difference", "z_score", "lookups_ratio", "p_value", "why",
+    "difference", "z_score", "lookups_ratio", "p_value", "seen_from", "runs", "why",
 )  # fmt: skip
 HEADER = (
-    "verdict",
-    "case",
-    "time contender/reference",
-    "variance c/r",
-    "difference",
-    "z",
-    "lookups c/r",
+    "verdict", "case", "time contender/reference", "variance c/r", "difference", "z", "lookups c/r",
     "why",
-)
-COLOURS = {"SAME": "", "FASTER": "green", "LESS_NOISE": "green", "NEW": "cyan"}
+)  # fmt: skip
+MOST_UNDECIDED = 8
+"""Of more undecided cases only their number is told."""
 LIMITS = "1 is no change, above 1 the contender is slower, noisier, or looks up more"
 STYLE = """:root{color-scheme:light dark}body{font:15px/1.4 system-ui,sans-serif;margin:1rem auto;
 max-width:1400px;padding:0 1rem}div{overflow-x:auto}table{border-collapse:collapse;font-size:.9rem}
@@ -49,29 +47,37 @@ def cells(one: Judged) -> list[str]:
     if one.time_ratio is not None:
         time = f"{one.time_ratio:.3g} ({one.time_low:.3g} to {one.time_high:.3g})"
     difference = "" if one.difference is None else f"{100 * one.difference:+.2g}%"
-    return [
-        one.verdict,
-        one.row["case"],
-        time,
-        short(one.variance_ratio),
-        difference,
-        short(one.z_score),
-        short(one.lookups_ratio),
-        one.why,
-    ]
+    numbers = short(one.variance_ratio), difference, short(one.z_score), short(one.lookups_ratio)
+    return [one.verdict, one.row["case"], time, *numbers, one.why]
 
 
-def table(judged: Sequence[Judged], *, everything: bool) -> Table:
-    """What changed, or all cases."""
-    shown = [one for one in judged if everything or one.verdict != "SAME"]
-    found = Table(box=None, padding=(0, 1, 0, 0), caption=LIMITS, caption_justify="left")
-    for name in HEADER:
-        found.add_column(name, overflow="fold")
-    for one in shown:
-        verdict, *others = map(escape, cells(one))
-        colour = COLOURS.get(one.verdict, "bold red")
-        found.add_row(f"[{colour}]{verdict}[/]" if colour else verdict, *others)
+def lines(judged: Sequence[Judged], *, everything: bool) -> list[str]:
+    """Two lines a case: of those that are not the same, but few of the undecided, or of all."""
+    undecided = sum(one.verdict == "UNDECIDED" for one in judged)
+    hidden = {"SAME", "UNDECIDED"} if undecided > MOST_UNDECIDED else {"SAME"}
+    found = []
+    for one in judged:
+        if everything or one.verdict not in hidden:
+            verdict, case, *numbers, why = cells(one)
+            named = zip(HEADER[2:-1], numbers, strict=True)
+            told = [f"{name} {text}" for name, text in named if text]
+            found += [f"{verdict:<10} {case}", f"    {'; '.join([*told, *filter(None, [why])])}"]
     return found
+
+
+def undecided(judged: Sequence[Judged], to_show: float) -> str:
+    """What undecided times could have shown, and what would show more; '' where there are none."""
+    seen = sorted(one.seen_from for one in judged if one.seen_from is not None)
+    if not seen:
+        return ""
+    runs = [one.runs for one in judged if one.seen_from is not None]
+    wanted = f"{100 * (to_show - 1):.2g} %"
+    text = f"times: no change below x{seen[0]:.3g}"
+    text += f" to x{seen[-1]:.3g}, by case," if len(seen) > 1 else ""
+    text += " would have been seen (95 %); "
+    if None in runs:
+        return text + f"no number of runs would show {wanted}: measure on a quieter machine"
+    return text + f"{max(runs)} runs a side would show {wanted}"
 
 
 def totals(judged: Sequence[Judged]) -> str:
@@ -120,6 +126,53 @@ def matrix_table(names: Sequence[str], results: Sequence[Sequence[Judged]]) -> T
     return found
 
 
+def as_json(names: Sequence[str], results: Sequence[Sequence[Judged]]) -> str:
+    """All rows of all contenders."""
+    pairs = zip(names, results, strict=True)
+    found = [{"contender": name} | record(one) for name, judged in pairs for one in judged]
+    return json.dumps(found, indent=1, allow_nan=False) + "\n"
+
+
+def as_markdown(
+    reference: str, names: Sequence[str], results: Sequence[Sequence[Judged]], to_show: float
+) -> str:
+    """For a pull request: what is not the same first, and the rest folded away."""
+    parts = []
+    for name, judged in zip(names, results, strict=True):
+        title = markdown.text_of(f"{name} compared with {reference}")
+        parts += [f"**{title}: {totals(judged)}**", "", undecided(judged, to_show), ""]
+        changed = [cells(one) for one in judged if one.verdict not in ("SAME", "UNDECIDED")]
+        others = [cells(one) for one in judged if one.verdict in ("SAME", "UNDECIDED")]
+        if changed:
+            parts += [*markdown.table_of(HEADER, changed), ""]
+        if others:
+            parts += [f"<details><summary>{len(others)} others</summary>", ""]
+            parts += [*markdown.table_of(HEADER, others), "", "</details>", ""]
+    return "\n".join([*parts, f"{LIMITS}.", ""])
+
+
+def write_junit(
+    path: Path, names: Sequence[str], results: Sequence[Sequence[Judged]], fail_on: Sequence[str]
+) -> None:
+    """A suite a contender: cases whose verdict is of fail_on fail, those undecided are skipped."""
+    from junitparser import Failure, JUnitXml, Skipped, TestCase, TestSuite
+
+    report = JUnitXml("freepath compare")
+    for name, judged in zip(names, results, strict=True):
+        suite, cases = TestSuite(name), []
+        for one in judged:
+            case = TestCase(one.row["case"], one.row["device"])
+            if one.verdict in fail_on:
+                case.result = [Failure("; ".join(filter(None, cells(one)[2:])), one.verdict)]
+            elif one.verdict == "UNDECIDED":
+                case.result = [Skipped(one.why)]
+            cases.append(case)
+        suite.add_testcases(cases)
+        report.add_testsuite(suite)
+    report.update_statistics()
+    report.write(str(path), pretty=True)
+
+
 def as_csv(names: Sequence[str], results: Sequence[Sequence[Judged]]) -> str:
     """All rows of all contenders."""
     file = io.StringIO()
@@ -156,6 +209,6 @@ def _html_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 def _class(text: str) -> str:
     word = text.split(" ", 1)[0]
-    if word in ("SLOWER", "MORE_NOISE", "DIFFERENT", "MISSING"):
+    if word in REGRESSIONS:
         return ' class="bad"'
     return ' class="good"' if word in ("FASTER", "LESS_NOISE") else ""

@@ -10,7 +10,7 @@ moved together is told apart: within what a machine may drift it is no case's fa
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from freepath.compare.moderation import moderated
@@ -25,6 +25,9 @@ BATCHES = 10
 """Neighbouring passes are put together into so many batches, as what disturbs one lasts."""
 ALONE = 0.3
 """Standard deviation of a change, in logs, where no other cases of the scene tell it."""
+SURE = 0.95
+"""The power that "would have been seen" means."""
+MOST_RUNS = 1000
 LEAST_RUNS = 3
 """With so many runs on either side, runs are what is compared: they differ by more than rounds."""
 
@@ -45,6 +48,38 @@ class Change:
     log_ratio: float
     stderr: float
     freedom: float
+    shared: float = 0.0
+    """How far, in logs, all cases of the scene may have changed alike (95 %) and it was taken for a
+    drift of the machine; infinite where nothing tells how far."""
+
+    @property
+    def width(self) -> float:
+        """Half the 95 % interval."""
+        return float(stats.t.ppf(0.975, self.freedom)) * self.stderr
+
+    def within(self, limit: float) -> bool:
+        """Whether the interval, and what all cases share, is no further from 0 than a limit."""
+        return abs(self.log_ratio) + self.width + self.shared <= limit
+
+    def seen_from(self, limit: float, level: float) -> float:
+        """The least change beyond a limit that is found in 95 % of comparisons (logs).
+
+        By tests at that level; no less than what this interval holds, as a change is known to be
+        no larger only by that.
+        """
+        quantiles = stats.t.ppf([1.0 - level, SURE], self.freedom)
+        power = limit + float(quantiles.sum()) * self.stderr
+        return max(power, abs(self.log_ratio) + self.width)
+
+    def runs_to_show(self, change: float, level: float, runs: int) -> int | None:
+        """How many runs a side find a change (beyond a limit, logs) in 95 % of comparisons.
+
+        From the error that so many `runs` have; None where MOST_RUNS would not do.
+        """
+        counts = np.arange(LEAST_RUNS, MOST_RUNS + 1)
+        needed = stats.t.ppf(1.0 - level, 2 * counts - 2) + stats.t.ppf(SURE, 2 * counts - 2)
+        enough = needed * self.stderr * np.sqrt(runs / counts) <= change
+        return int(counts[enough.argmax()]) if enough.any() else None
 
     def p_beyond(self, limit: float) -> tuple[float, float]:
         """One-sided p-values that the ratio is no more than +limit, no less than -limit (logs)."""
@@ -152,13 +187,16 @@ def changes(
             members.setdefault(scene_of[key], []).append(key)
     found, shifts = {}, {}
     several = min(len(reference.runs), len(contender.runs)) >= LEAST_RUNS
+    unknown = math.inf
     for scene, keys in members.items():
         ratios = np.array([after[key].level - before[key].level for key in keys])
         shift = taken = float(np.median(ratios))
         if drift is not None:
-            taken = min(max(shift, -math.log(drift)), math.log(drift))
-        elif several and _shifted(reference, contender, keys) <= alpha / len(members):
-            taken = 0.0
+            taken, unknown = min(max(shift, -math.log(drift)), math.log(drift)), 0.0
+        elif several:
+            p_value, width = _shifted(reference, contender, keys)
+            taken = 0.0 if p_value <= alpha / len(members) else shift
+            unknown = abs(taken) + width
         shifts[scene] = shift, taken
         for place, (key, ratio) in enumerate(zip(keys, ratios, strict=True)):
             spread = 0.0
@@ -168,6 +206,7 @@ def changes(
             found[key] = _change(before[key], after[key], ratio - taken, spread, len(keys))
         if several:
             found |= _steadied({key: found[key] for key in keys})
+        found |= {key: replace(found[key], shared=unknown) for key in keys}
     return found, shifts
 
 
@@ -183,13 +222,16 @@ def _steadied(found: dict[Key, Change]) -> dict[Key, Change]:
     }
 
 
-def _shifted(reference: Side, contender: Side, keys: list[Key]) -> float:
-    """The p-value that runs of both sides are equally fast, over all these cases."""
+def _shifted(reference: Side, contender: Side, keys: list[Key]) -> tuple[float, float]:
+    """The p-value that runs of both sides are equally fast over all these cases; and half the 95 %
+    interval of by how much they are not, in logs."""
     levels = [
         [np.median([e[key][0].level for key in keys if key in e]) for e in map(effects, side.runs)]
         for side in (reference, contender)
     ]
-    return float(stats.ttest_ind(*levels, equal_var=False, nan_policy="omit").pvalue)
+    found = stats.ttest_ind(*levels, equal_var=False, nan_policy="omit")
+    interval = found.confidence_interval()
+    return float(found.pvalue), float(interval.high - interval.low) / 2
 
 
 def _change(before: Effect, after: Effect, ratio: float, others: float, cases: int) -> Change:

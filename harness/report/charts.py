@@ -28,6 +28,7 @@ from freepath.report.axes import (
     shape_of,
 )
 from freepath.report.data import DEEPEST, Report
+from freepath.table import UNSETTLED
 
 POINTS = 32
 RMSE = "sqrt(pow(datum.b, 2) + datum.v * datum.t / datum.time)"
@@ -94,9 +95,13 @@ def cost(report: Report) -> alt.LayerChart:
 
 
 def pareto(report: Report) -> alt.LayerChart:
-    """The least RMSE that any case has after a time, and which case that is; a line a device."""
+    """The least RMSE that any case has after a time, and which case that is; a line a device.
+
+    Of cases whose variance is known.
+    """
     base = (
         alt.Chart(alt.NamedData("rows"))
+        .transform_filter(f"isValid(datum.vn) && datum.vn <= {UNSETTLED}")
         .transform_calculate(grid=f"sequence(0, {2 * POINTS + 1})")
         .transform_flatten(["grid"])
         .transform_calculate(time=f"datum.lo * pow(datum.hi / datum.lo, datum.grid / {2 * POINTS})")

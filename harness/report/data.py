@@ -9,10 +9,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from freepath.answers import Case
 from freepath.errors import FreepathError
 from freepath.ladder import Ladder
-from freepath.results import CHECKS, CONFIRM, CONFIRM_COLUMNS, RUN, SUMMARY, read_rows
-from freepath.table import ROUGH, Row, along, bounces, lit, number, uncertainty
+from freepath.reading import facts
+from freepath.results import CHECKS, CONFIRM, CONFIRM_COLUMNS, RUN, SUMMARY, read_result, read_rows
+from freepath.table import ROUGH, Row, along, bounces, lit, number, settled, uncertainty
 
 DEEPEST, HIGHEST = 1e-4, 10.0
 """Relative errors between which curves are drawn."""
@@ -59,7 +61,7 @@ def load(results: Sequence[Path]) -> Report:
             records[row["case_id"], row["device"], row["platform"]] = record
             report.rows.append(record)
         report.places.append((path, records))
-        report.runs.append({"name": name, "checks": _checks(path)} | _facts(path))
+        report.runs.append({"name": name, "checks": _checks(path)} | facts(path / RUN))
     for question in report.values("q"):
         _span([row for row in report.measured if row["q"] == question])
     for number_, row in enumerate(report.rows):
@@ -85,23 +87,14 @@ def _summary(result: Path) -> list[Row]:
     summary = result / SUMMARY
     if not summary.is_file():
         raise FreepathError(f"{result}: expected the folder of a run, with {SUMMARY} in it")
-    return read_rows(summary)
-
-
-def _facts(result: Path) -> dict[str, Any]:
-    """What run.json says, or nothing: a report can do without."""
-    try:
-        facts = json.loads((result / RUN).read_text("utf-8"))
-    except (OSError, ValueError):
-        return {}
-    return facts if isinstance(facts, dict) else {}
+    return read_result(result)[0]
 
 
 def _checks(result: Path) -> list[dict[str, Any]]:
     """What became of the checks of a tracker on trial, where the result is of one."""
     try:
         found = json.loads((result / CHECKS).read_text("utf-8"))
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):
         return []
     known = [one for one in found if isinstance(one, dict)] if isinstance(found, list) else []
     return [one for one in known if {"name", "status", "text"} <= one.keys()]
@@ -159,7 +152,17 @@ def _record(row: Row, variants: list[tuple[str, str]], device: str) -> dict[str,
         "vn": number(row, "variance_noise"),
     }
     record |= _errors(row) | {name: _time(row[column]) for name, column in LADDER.items()}
-    return record | {"rough": [name for name in LADDER if known_to(record, name) > ROUGH]}
+    rough = [name for name in LADDER if known_to(record, name) > ROUGH]
+    unknown = [name for name in rough if not settled(known_to(record, name))]
+    return record | {"rough": rough, "unknown": unknown}
+
+
+def answered(record: dict[str, Any], name: str = "t1") -> Case | None:
+    """A record as answers rank it; None where it does not reach the accuracy."""
+    if record["v"] is None or not isinstance(record[name], float):
+        return None
+    parts = (record[one] for one in ("case", "tracker", "label", "bound", "x", name))
+    return Case(*parts, known_to(record, name), record["b"])
 
 
 def known_to(record: dict[str, Any], name: str) -> float:
@@ -184,7 +187,11 @@ def _errors(row: Row) -> dict[str, float | None]:
     if not scale or variance is None or row["status"] != "ok":
         return dict.fromkeys(names)
     bias, stderr, rms = (number(row, c) or 0.0 for c in ("bias", "bias_stderr", "bias_rms"))
-    relative = variance / scale**2
+    # the square of a small transmittance may be no number any more
+    relative = math.sqrt(variance) / scale
+    relative *= relative
+    if not math.isfinite(relative):
+        return dict.fromkeys(names)
     values = (
         relative,
         rms / scale,
@@ -222,13 +229,14 @@ def _confirmed(result: Path, records: dict[tuple, dict]) -> list[dict[str, Any]]
         record = records.get((row["case_id"], row["device"], row["platform"]))
         values = [number(row, f"rmse_{what}") for what in ("predicted", "measured", "low", "high")]
         predicted, measured, low, high = values
-        if record is None or not predicted or not measured:
+        reference = number(row, "reference")
+        if record is None or None in values or not (predicted and measured and reference):
             continue
         shown = ("q", "device", "method", "colour", "label", "tracker", "case")
         found.append(
             {name: record.get(name) for name in shown}
             | {
-                "predicted": predicted / abs(number(row, "reference")),
+                "predicted": predicted / abs(reference),
                 "ratio": measured / predicted,
                 "low": low / predicted,
                 "high": high / predicted,

@@ -17,7 +17,7 @@
     const [scale, prefix] = prefixes.find(([one]) => value < 999.5 * one) ?? prefixes[4];
     return `${Number((value / scale).toPrecision(3))} ${prefix}s`;
   };
-  const until = (row, name) => (row.rough.includes(name) ? "~" : "") + seconds(row[name]);
+  const until = (row, name) => (row.unknown.includes(name) ? "?" : row.rough.includes(name) ? "~" : "") + seconds(row[name]);
   const short = (value) => (value === null ? "" : String(Number(value.toPrecision(3))));
   const percent = (value) => (value === null ? "" : `${(100 * value).toFixed(0)}%`);
   const signed = (row) => row.bias === null ? "" :
@@ -56,7 +56,7 @@
 
   // Rows come in the order in which cases happened to end.
   const questions = [...new Set(rows.map((row) => row.q))];
-  const soon = (row) => (typeof row.t1 === "number" ? row.t1 : Infinity);
+  const soon = (row) => (typeof row.t1 === "number" && !row.unknown.includes("t1") ? row.t1 : Infinity);
   const sooner = (a, b) => questions.indexOf(a.q) - questions.indexOf(b.q) || (soon(a) === soon(b) ? 0 : soon(a) - soon(b));
   rows.sort(sooner);
 

@@ -20,7 +20,8 @@ from freepath.version import __version__
 FIELDS = (
     "id", "q", "device", "case", "label", "tracker", "majorant", "bound", "method", "x", "lanes",
     "arithmetic", "storage", "status", "reason", "t", "lookups", "occupancy", "tn", "vn",
-    "v", "b", "bias", "bias_width", "vt", "vl", "t10", "t1", "t01", "rough", "lo", "hi", "colour",
+    "v", "b", "bias", "bias_width", "vt", "vl", "t10", "t1", "t01", "rough", "unknown", "lo", "hi",
+    "colour",
 )  # fmt: skip
 """What of a record goes into the page."""
 

@@ -44,11 +44,15 @@ def picture(report: Report, name: str, columns: int = 2) -> Any:
 
 
 def soonest(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """At most MOST rows, those that reach 1 % first; never and unknown last."""
+    """At most MOST rows, those that reach 1 % first; never and what is not known last."""
     if len(rows) <= MOST or "t1" not in rows[0]:
         return rows
-    late = (None, "never")
-    return sorted(rows, key=lambda r: float("inf") if r["t1"] in late else r["t1"])[:MOST]
+
+    def late(row: dict[str, Any]) -> float:
+        known = isinstance(row["t1"], float) and "t1" not in row["unknown"]
+        return row["t1"] if known else float("inf")
+
+    return sorted(rows, key=late)[:MOST]
 
 
 def _with_data(chart: Any, data: Any) -> Any:

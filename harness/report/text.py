@@ -5,17 +5,20 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from freepath.report.data import LADDER, Report, known_to
-from freepath.table import marked, seconds, short, soonest
+from freepath.answers import sentence
+from freepath.markdown import table_of as table_lines
+from freepath.markdown import text_of
+from freepath.report.data import LADDER, Report, answered, known_to
+from freepath.table import FAILED, marked, seconds, short, soonest
 from rich.markup import escape
 from rich.table import Table
 
 TARGETS = dict(zip(LADDER, ("to 10 %", "to 1 %", "to 0.1 %"), strict=True))
-HEADER = ("case", "device", "lookups", "time", "occ.", "rel. var.", "bias", *TARGETS.values())
+HEADER = ("case", "device", "lookups", "time", "occ.", "rel. var.", "bias (RMS)", *TARGETS.values())
 
 
 def winners(report: Report) -> list[list[str]]:
-    """For each question and device: what reaches each accuracy soonest, and when."""
+    """For each question and device: what is the fastest to each accuracy, and when."""
     found: dict[tuple[str, str], list[dict[str, Any]]] = {}
     for row in report.measured:
         found.setdefault((row["q"], row["device"]), []).append(row)
@@ -31,16 +34,31 @@ def winners(report: Report) -> list[list[str]]:
 def _winner(reaching: list[dict[str, Any]], name: str) -> str:
     places = soonest([(row[name], known_to(row, name)) for row in reaching])
     if not places:
-        return "none"
+        return "not known" if reaching else "none"
     best, others = reaching[places[0]], len(places) - 1
-    also = f" (not significantly later: {others} more)" if others else ""
+    also = f" (not significantly slower: {others} more)" if others else ""
     return f"{_time(best, name)}, {best['method']}{also}"
+
+
+def sentences(report: Report, baseline: str = "") -> list[str]:
+    """The answer at 1 % to each question on each device."""
+    several = len(report.values("device")) > 1
+    found: dict[tuple[str, str], list[dict[str, Any]]] = {}
+    for row in report.rows:
+        found.setdefault((row["q"], row["device"]), []).append(row)
+    lines = []
+    for (question, device), rows in found.items():
+        cases = [one for one in map(answered, rows) if one]
+        failed = sum(row["status"] in FAILED for row in rows)
+        told = f"{question}, on {device}" if several else question
+        lines.append(f"{told}: {sentence(cases, 0.01, baseline, failed)}")
+    return lines
 
 
 def summary(report: Report) -> Table:
     """The winners as a table for the terminal."""
     several = len(report.values("device")) > 1
-    table = Table(title="soonest at an accuracy", title_justify="left", box=None)
+    table = Table(title="fastest to an accuracy", title_justify="left", box=None)
     table.padding = (0, 1, 0, 0)
     table.add_column("question", overflow="fold")
     if several:
@@ -63,6 +81,7 @@ def cells(row: dict[str, Any]) -> list[str]:
         return [row["method"], row["device"], *[""] * 4, row["status"], *[""] * len(TARGETS)]
     known = row["bias"] is not None
     bias = f"{100 * row['bias']:+.2g}±{100 * row['bias_width']:.1g}%" if known else ""
+    bias += f" ({100 * row['b']:.1g}%)" if row["b"] else ""
     return [
         row["method"],
         row["device"],
@@ -75,26 +94,18 @@ def cells(row: dict[str, Any]) -> list[str]:
     ]
 
 
-def _markdown_row(texts: list[str] | tuple[str, ...]) -> str:
-    special = str.maketrans({c: f"\\{c}" for c in "\\`*_[]<>|#"} | {"\n": " ", "\r": " "})
-    return "| " + " | ".join(text.translate(special) for text in texts) + " |"
-
-
-def _markdown_table(header: list[str] | tuple[str, ...], rows: list[list[str]]) -> list[str]:
-    return [_markdown_row(header), "|" + " --- |" * len(header), *map(_markdown_row, rows)]
-
-
-def markdown(report: Report) -> str:
-    """The whole report: winners, all cases, and where it was measured."""
+def markdown(report: Report, baseline: str = "") -> str:
+    """The whole report: answers, winners, all cases, and where it was measured."""
     lines = ["# What accuracy costs in time", ""]
-    lines += _markdown_table(["question", "device", *TARGETS.values()], winners(report))
+    lines += [*(f"- {text_of(line)}" for line in sentences(report, baseline)), ""]
+    lines += table_lines(["question", "device", *TARGETS.values()], winners(report))
     for question in report.values("q"):
         rows = [cells(row) for row in report.rows if row["q"] == question]
-        lines += ["", f"## {question}".translate({ord("\n"): " "}), ""]
-        lines += _markdown_table(HEADER, rows)
+        lines += ["", f"## {text_of(question)}", ""]
+        lines += table_lines(HEADER, rows)
     lines += ["", "## Environment", ""]
     facts = [[key, value] for run in report.runs for key, value in environment(run)]
-    lines += _markdown_table(["", ""], facts)
+    lines += table_lines(["", ""], facts)
     return "\n".join(lines) + "\n"
 
 

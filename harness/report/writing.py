@@ -28,14 +28,18 @@ def format_of(output: Path | None, wanted: str | None) -> str:
 
 
 def write(
-    results: Sequence[Path], output: Path | None, wanted: str | None, chart: str = "cost"
+    results: Sequence[Path],
+    output: Path | None,
+    wanted: str | None,
+    chart: str = "cost",
+    baseline: str = "",
 ) -> tuple[Report, Path]:
     """Write the report of results, into `output` or a file of the first one's folder.
 
     Raises FreepathError where a result cannot be read, a file not be written, a package is missing,
     or a chart has nothing to show.
     """
-    report, data, chosen = made(results, output, wanted, chart)
+    report, data, chosen = made(results, output, wanted, chart, baseline)
     output = output or results[0] / f"report.{chosen}"
     try:
         output.write_bytes(data)
@@ -45,7 +49,11 @@ def write(
 
 
 def made(
-    results: Sequence[Path], output: Path | None, wanted: str | None, chart: str = "cost"
+    results: Sequence[Path],
+    output: Path | None,
+    wanted: str | None,
+    chart: str = "cost",
+    baseline: str = "",
 ) -> tuple[Report, bytes, str]:
     """The report of results, what a file of it holds, and its format; raises as `write` does."""
     chosen = format_of(output, wanted)
@@ -62,7 +70,7 @@ def made(
     if chosen == "md":
         from freepath.report.text import markdown
 
-        return report, markdown(report).encode(), chosen
+        return report, markdown(report, baseline).encode(), chosen
     from freepath.report.pictures import drawn
 
     return report, drawn(report, chart, chosen), chosen

@@ -2,7 +2,7 @@
 
 `python tests/support/full_sweep.py VOLUME SIGMA_T -o DIR [--budget S] [--seconds S]` searches with
 the budget, then measures every case of the search for so many seconds each, and prints what was
-recommended, the soonest cases of the sweep, and how the recommended one stands among these.
+recommended, the fastest cases of the sweep, and how the recommended one stands among these.
 """
 
 import argparse
@@ -32,12 +32,23 @@ def search_of(options: argparse.Namespace) -> recommend.Search:
     )
 
 
+def every(search: recommend.Search) -> list[recommend.Axes]:
+    """The cases that the search is over: what a full sweep measures."""
+    shape, side = search.voxels()
+    return [
+        {"tracker": tracker, "majorant": majorant, "tightness": tightness}
+        for tracker in search.trackers(side)
+        for majorant in recommend.majorants_of(shape)
+        for tightness in recommend.TIGHTNESS
+    ]
+
+
 def full_sweep(search: recommend.Search, at_most_s: float) -> dict[str, tuple[float, float]]:
     """Device seconds a ray to the accuracy and its noise, by the case's name."""
     stop = recommend.PRECISION[-1] | {"at_most": f"{at_most_s:g} s"}
     path = search.folder / "full.yaml"
-    path.write_text(search.config_text(search.every(), stop), "utf-8")
-    rows, _ = search.measure(path)
+    path.write_text(search.config_text(every(search), stop), "utf-8")
+    rows = search.measure(path).folder.rows()
     never = math.inf, 0.0
     return {r["case"]: recommend.needed(r, search.accuracy) or never for r in rows}
 
@@ -63,14 +74,14 @@ def main() -> None:
     finalists = search.run()
     first = (search.clock.outside_s, search.clock.build_s)
     print(f"{options.volume.name}, {options.estimand}, {search.device.info.label}")
-    print("\n".join(told_of(finalists)))
+    print("\n".join(told_of([one.case for one in finalists])))
     times = full_sweep(search, options.seconds)
     outside, build = search.clock.outside_s - first[0], search.clock.build_s - first[1]
-    print(f"\nfull sweep of {len(times)} cases, the soonest:")
+    print(f"\nfull sweep of {len(times)} cases, the fastest:")
     for name, (time_s, noise) in sorted(times.items(), key=lambda one: one[1][0])[:5]:
         print(f"  {name}  {seconds(time_s)} +- {100 * noise:.1f} %")
-    ratio = times[finalists[0].name][0] / min(time_s for time_s, _ in times.values())
-    print(f"recommended / soonest of the sweep: {ratio:.3f}")
+    ratio = times[finalists[0].case.case][0] / min(time_s for time_s, _ in times.values())
+    print(f"recommended / fastest of the sweep: {ratio:.3f}")
     print(
         f"took {first[0]:.0f} s and {first[1]:.0f} s of compilation; the sweep {outside:.0f} s and "
         f"{build:.0f} s: {first[0] / outside:.3f} of its time, with compilation "

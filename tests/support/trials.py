@@ -1,6 +1,6 @@
 """Tries a comparison on reruns of one sweep: false alarms, and what of planted changes is found.
 
-    python -m freepath.compare.trials RERUNS [--runs K] [--tries N]
+    python tests/support/trials.py RERUNS [--runs K] [--tries N]
 
 RERUNS holds a folder for each rerun. A try draws two disjoint sets of K reruns at random, so that
 reference and contender have the noise, the drift and the load that runs of this machine have.
@@ -74,7 +74,7 @@ def rate(
 
 def main(arguments: list[str] | None = None) -> int:
     """Print the rates; returns the exit code."""
-    parser = argparse.ArgumentParser(prog="python -m freepath.compare.trials")
+    parser = argparse.ArgumentParser(prog="trials.py")
     parser.add_argument("reruns", type=Path, help="a folder with a folder for each rerun")
     parser.add_argument("--runs", type=int, nargs="+", default=[1], help="runs a side")
     parser.add_argument("--tries", type=int, default=1000, help="A/A comparisons")
