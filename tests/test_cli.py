@@ -247,6 +247,7 @@ parameters:
   step: {unit: length, default: 0.5, above: 0, meaning: how far}
   way: {choices: [up, down], default: up}
 ---*/
+static void step(Path *path, const Scene *scene, Rng *rng) {}
 """
     (work / "mine" / "mine.cl").write_text(text)
     out = call("list", "--trackers", "mine")[1]
