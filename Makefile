@@ -12,7 +12,7 @@ KIT_OPTIONS ?=
 .PHONY: sweep test devices kit lint schema clean
 
 sweep: $(VENV)/installed
-	$(BIN)/python -m freepath.device_setup --if-needed
+	$(BIN)/python -m freepath.extras.device_setup --if-needed
 	$(BIN)/freepath run quick
 
 test: $(VENV)/installed-for-tests
@@ -21,18 +21,20 @@ test: $(VENV)/installed-for-tests
 # OpenCL drivers that need no special hardware: by apt where this is root, and by pip. What cannot be
 # had is said, and the others are installed all the same.
 devices: $(VENV)/installed
-	$(BIN)/python -m freepath.device_setup
+	$(BIN)/python -m freepath.extras.device_setup
 
 kit: $(BIN)/python
 	$(BIN)/python packaging/make_kit.py kit $(if $(KIT_PYTHON),--python $(KIT_PYTHON)) $(KIT_OPTIONS)
 
 lint: $(VENV)/installed-for-tests
-	$(BIN)/ruff check harness tests
-	$(BIN)/ruff format --check harness tests
+	$(BIN)/ruff check setup.py harness tests
+	$(BIN)/ruff format --check setup.py harness tests
+	$(BIN)/mypy
+	$(BIN)/python tests/lines.py
 
 schema: $(VENV)/installed
-	$(BIN)/python -m freepath.catalog configs/schema.json
-	$(BIN)/python -m freepath.columns docs/notation.md
+	$(BIN)/freepath schema -o configs/schema.json
+	$(BIN)/python -m freepath.results.columns docs/notation.md
 
 # Debian's python3 has venv only with the package python3-venv, whose installation takes root;
 # virtualenv does the same from the package index.
@@ -42,7 +44,7 @@ $(BIN)/python:
 	  $(PYTHON) -m pip install --quiet --target $(VENV)-maker virtualenv && \
 	  PYTHONPATH=$(VENV)-maker $(PYTHON) -m virtualenv --quiet $(VENV) )
 
-$(VENV)/installed: $(BIN)/python setup.cfg pyproject.toml
+$(VENV)/installed: $(BIN)/python setup.cfg pyproject.toml setup.py
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[pocl,report]'
 	touch $@
 
@@ -51,4 +53,4 @@ $(VENV)/installed-for-tests: $(VENV)/installed
 	touch $@
 
 clean:
-	rm -rf $(VENV) $(VENV)-maker kit build dist *.egg-info
+	rm -rf $(VENV) $(VENV)-maker kit build dist *.egg-info harness/*.egg-info

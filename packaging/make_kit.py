@@ -17,7 +17,16 @@ from pathlib import Path
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent
-SOURCES = ("harness", "kernels", "configs", "setup.cfg", "pyproject.toml", "README.md", "LICENSE")
+SOURCES = (
+    "harness",
+    "kernels",
+    "configs",
+    "setup.py",
+    "setup.cfg",
+    "pyproject.toml",
+    "README.md",
+    "LICENSE",
+)
 LEFT_OUT = ("OpenImageIO",)
 """Requirements of pictures and images alone: each would be as large as half of the kit."""
 PLATFORMS = ("_2_28", "_2_27", "_2_26", "_2_24", "_2_17", "2014", "_2_12", "2010", "_2_5", "1")

@@ -129,7 +129,7 @@ all_steps() {
   if [ -z "$device" ]; then
     # a GPU where there is one, else what freepath takes by itself
     device=$("$work/env/bin/python" - 2>>"$results/machine.log" <<'PYTHON'
-from freepath.device import list_devices
+from freepath.device.opencl import list_devices
 
 found = [info for info in list_devices() if info.kind == "GPU"]
 print(*[f"{info.platform} / {info.name} / {info.driver_version}" for info in found[:1]])

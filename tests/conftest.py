@@ -4,7 +4,8 @@ import os
 import shutil
 
 import pytest
-from freepath import catalog
+
+from freepath.compose import catalog
 
 if "FREEPATH_TEST_DEVICE" in os.environ:
     os.environ["FREEPATH_DEVICE"] = os.environ["FREEPATH_TEST_DEVICE"]
@@ -54,7 +55,7 @@ def load_text(tmp_path, monkeypatch, small_catalog):
 @pytest.fixture(scope="session")
 def trials():
     """The file of what drivers' trials showed, for caches that begin empty."""
-    from freepath import trial
+    from freepath.device import trial
 
     trial.of_installed()
     return trial.cache_file()
@@ -63,7 +64,7 @@ def trials():
 @pytest.fixture(scope="session")
 def device(trials):
     """The device that no -d means: $FREEPATH_DEVICE, or the first that works."""
-    from freepath.selection import one_device
+    from freepath.device.selection import one_device
 
     return one_device([])
 
@@ -89,6 +90,6 @@ def work(tmp_path, monkeypatch, trials):
 
 @pytest.fixture(scope="session")
 def rig(device, tmp_path_factory):
-    from freepath.check.rig import Rig
+    from freepath.checks.rig import Rig
 
     return Rig(device, catalog.load(), tmp_path_factory.mktemp("rig"))

@@ -1,80 +1,56 @@
-"""Data flows one way: no module imports one to its right, and only what needs OpenCL loads it."""
+"""Data flows one way: no part imports one to its right, and only what needs OpenCL loads it."""
 
 import ast
 from pathlib import Path
 
-import freepath
 import pytest
 
+import freepath
+
 FOLDER = Path(freepath.__file__).parent
-# Each line may import those above it and none of its own or below.
 ORDER = (
-    ("version",),
-    ("__init__", "errors", "environment", "columns", "ladder"),
-    ("config",),
-    ("kernel_files",),
-    ("catalog",),
-    ("path_axes",),
-    ("applicable", "effects", "listing"),
-    ("plan",),
-    ("scene", "source", "octree", "stats"),
-    ("majorants",),
-    ("stopping", "cpu_name", "icd", "compilers"),
-    ("drivers",),
-    ("device",),
-    ("limits", "trial"),
-    ("selection",),
-    ("runner",),
-    ("measure", "journal"),
-    ("geometry",),
-    ("reading",),
-    ("results",),
-    ("rows", "table", "markdown", "binding", "confirm", "pictures"),
-    ("answers",),
-    ("equal_time", "report", "compare"),
-    ("jobs",),
-    ("run_file",),
-    ("sweep",),
-    ("arguments", "device_setup"),
-    ("api", "check"),
-    ("candidate", "recommend"),
-    ("commands",),
-    ("cli",),
-    ("__main__",),
+    "__init__",
+    "errors",
+    "paths",
+    "config",
+    "compose",
+    "cases",
+    "scene",
+    "device",
+    "results",
+    "measure",
+    "show",
+    "api",
+    "checks",
+    "extras",
+    "commands",
+    "cli",
+    "__main__",
 )
-PLACE = {name: place for place, names in enumerate(ORDER) for name in names}
-LONGEST = 330
+"""Each part may import those above it: docs/decisions/module-order.md."""
+PLACE = {name: place for place, name in enumerate(ORDER)}
+OPENCL = {"device/opencl.py", "measure/runner.py"}
 ONLY_CSV = {
-    "table": {"errors"},
-    "answers": {"table"},
-    "markdown": set(),
-    # the pictures of a run are files beside its CSV
-    "report": {
-        "answers",
-        "errors",
-        "ladder",
-        "markdown",
-        "pictures",
-        "reading",
-        "report",
-        "results",
-        "table",
-        "version",
-    },
-    "compare": {"errors", "markdown", "reading", "results", "table", "compare"},
-    "results": {"errors", "journal", "columns", "reading"},
-    "reading": {"errors"},
-    "journal": {"errors"},
+    # the pictures of a run are files beside its CSV; the ladder is arithmetic on a row
+    "show/report": {"__init__", "errors", "results", "show", "measure.pictures", "measure.ladder"},
+    "show/compare": {"errors", "results", "show"},
+    "show/table.py": {"errors"},
+    "results": {"errors", "results"},
 }
-"""What modules may import that work on rows of CSV and on nothing else."""
+"""What may be imported by what works on rows of CSV and on nothing else."""
 
 
-def modules():
-    return sorted(FOLDER.rglob("*.py"))
+def modules(below=""):
+    found = FOLDER / below
+    return [found] if found.is_file() else sorted(found.rglob("*.py"))
+
+
+def named(path):
+    return path.relative_to(FOLDER).as_posix()
 
 
 def part(path):
-    """The module or sub-package of freepath that a file belongs to."""
+    """The part of freepath that a file belongs to."""
     return path.relative_to(FOLDER).with_suffix("").parts[0]
 
 
@@ -98,66 +74,66 @@ def imports(path):
 
 
 def own_imports(path):
-    """The parts of freepath that a file imports."""
+    """What a file imports of freepath: the names behind `freepath.`, and their lines."""
     for name, line in imports(path):
         package, _, rest = name.partition(".")
         if package == "freepath":
-            first = rest.split(".")[0]
-            yield (first if first in PLACE else "__init__"), line
+            yield (rest if rest.split(".")[0] in PLACE else "__init__"), line
 
 
-def test_every_module_has_its_place():
-    parts = {part(path) for path in modules()}
-    assert parts == set(PLACE)
+def test_every_part_has_its_place():
+    assert {part(path) for path in modules()} == set(PLACE)
 
 
-@pytest.mark.parametrize("path", modules(), ids=lambda path: str(path.relative_to(FOLDER)))
+@pytest.mark.parametrize("path", modules(), ids=named)
 def test_no_module_imports_one_to_its_right(path):
     own = part(path)
     for name, line in own_imports(path):
-        assert name == own or PLACE[name] < PLACE[own], f"{path}:{line}: {own} imports {name}"
-
-
-def reached(names):
-    """All parts that these import, directly or not, themselves included."""
-    found, left = set(), set(names)
-    while left:
-        name = left.pop()
-        found.add(name)
-        files = [path for path in modules() if part(path) == name]
-        left |= {other for path in files for other, _ in own_imports(path)} - found
-    return found
-
-
-def test_left_of_the_device_nothing_needs_opencl():
-    left = {name for name, place in PLACE.items() if place < PLACE["device"]}
-    assert reached(left) <= left
-    for path in modules():
-        if part(path) in left | {"results", "table", "report", "compare", "arguments"}:
-            assert not [name for name, _ in imports(path) if name.startswith("pyopencl")], path
+        of = name.split(".")[0]
+        assert of == own or PLACE[of] < PLACE[own], f"{path}:{line}: {own} imports {name}"
 
 
 def test_opencl_is_where_it_belongs():
-    users = {part(path) for path in modules() if any(n == "pyopencl" for n, _ in imports(path))}
-    assert users == {"device", "runner"}
+    users = {named(path) for path in modules() if "pyopencl" in {n for n, _ in imports(path)}}
+    assert users == OPENCL
 
 
-@pytest.mark.parametrize(("name", "allowed"), ONLY_CSV.items())
-def test_what_is_shown_of_results_comes_from_csv(name, allowed):
-    files = [path for path in modules() if part(path) == name]
-    assert files
-    for path in files:
-        assert {other for other, _ in own_imports(path)} <= allowed
+@pytest.mark.parametrize(("below", "allowed"), ONLY_CSV.items())
+def test_what_is_shown_of_results_comes_from_csv(below, allowed):
+    assert modules(below)
+    for path in modules(below):
+        for name, line in own_imports(path):
+            known = any(name == one or name.startswith(f"{one}.") for one in allowed)
+            assert known, f"{path}:{line}: {name}"
 
 
-@pytest.mark.parametrize("path", modules(), ids=lambda path: str(path.relative_to(FOLDER)))
-def test_modules_are_short(path):
-    assert len(path.read_text("utf-8").splitlines()) <= LONGEST
+def test_what_a_report_needs_of_measure_needs_no_opencl():
+    """No module of measure that a report may use reaches one that calls OpenCL."""
+    allowed = [name for name in ONLY_CSV["show/report"] if name.startswith("measure.")]
+    files = [f"{name.replace('.', '/')}.py" for name in allowed]
+    seen, left = set(), [name for name in files if (FOLDER / name).is_file()]
+    while left:
+        name = left.pop()
+        seen.add(name)
+        for found, _ in own_imports(FOLDER / name):
+            files = [f"{'/'.join(found.split('.')[:n])}.py" for n in (1, 2, 3)]
+            left += [file for file in files if (FOLDER / file).is_file() and file not in seen]
+    assert len(seen) > 1
+    assert not seen & OPENCL
+
+
+@pytest.mark.parametrize("folder", sorted({part(p) for p in modules() if p.parent != FOLDER}))
+def test_each_part_says_at_its_head_what_lives_there(folder):
+    text = ast.get_docstring(ast.parse((FOLDER / folder / "__init__.py").read_text("utf-8")))
+    said, empty, *more = text.splitlines()
+    assert said
+    assert not empty
+    assert len(more) >= 2  # what lives there, and what may be touched
 
 
 def test_a_wrong_import_would_be_found(tmp_path):
     wrong = tmp_path / "errors.py"
-    wrong.write_text("def f():\n    from freepath.device import Device\n")
-    assert list(own_imports(wrong)) == [("device", 2)]
-    wrong.write_text("import freepath.cli\nfrom freepath import sweep, __version__\n")
-    assert list(own_imports(wrong)) == [("cli", 1), ("sweep", 2), ("__init__", 2)]
+    wrong.write_text("def f():\n    from freepath.device.opencl import Device\n")
+    assert list(own_imports(wrong)) == [("device.opencl.Device", 2)]
+    wrong.write_text("import freepath.cli\nfrom freepath import extras, __version__\n")
+    assert list(own_imports(wrong)) == [("cli", 1), ("extras", 2), ("__init__", 2)]

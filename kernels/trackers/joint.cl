@@ -18,7 +18,7 @@ citation: >-
 ---*/
 /* A vertex that is the last before the light is drawn by the angle that the light sees it under and by its phase
    function. Of two, the first is drawn by the inverse distance to the light, which is what directions and
-   distances of the second leave of the product of both (docs/light.md); effects/aimed_direction.cl draws its
+   distances of the second leave of the product of both (docs/light.md); light/aimed_direction.cl draws its
    direction. A vertex may be either, so its density is that of both. */
 static void begin(Path *path, const Scene *scene, Rng *rng)
 {

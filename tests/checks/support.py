@@ -1,10 +1,11 @@
 """The checks of `freepath check` as tests: one each."""
 
 import pytest
-from freepath import catalog
-from freepath.check import registry
-from freepath.check.model import LEVEL
-from freepath.check.verdict import NotApplicable
+
+from freepath.checks import registry
+from freepath.checks.model import LEVEL
+from freepath.checks.verdict import NotApplicable
+from freepath.compose import catalog
 
 CHECKS = registry.checks(catalog.load())
 

@@ -10,11 +10,12 @@ import time
 from xml.etree import ElementTree
 
 import pytest
-from freepath.check import files, printing
-from freepath.check.model import Check
-from freepath.check.outcome import Outcome
-from freepath.check.pool import Pool, Task
-from freepath.check.worker import Setting
+
+from freepath.checks import files, printing
+from freepath.checks.model import Check
+from freepath.checks.outcome import Outcome
+from freepath.checks.pool import Pool, Task
+from freepath.checks.worker import Setting
 from freepath.cli import main
 
 QUICK = "^hard/bad-input/(nan|negative|text)$"
@@ -228,7 +229,7 @@ def hang(*_):
 @pytest.mark.parametrize(("doing", "status"), [(crash, "Crashed"), (hang, "Timeout")])
 def test_a_check_that_takes_its_process_with_it(monkeypatch, selector, tmp_path, doing, status):
     """The others are run all the same, by another process, and nothing is left behind."""
-    monkeypatch.setattr("freepath.check.pool._serve", serve_badly)
+    monkeypatch.setattr("freepath.checks.pool._serve", serve_badly)
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     tasks = [
         Task(i, Check(name, (), "", doing), 0) for i, name in enumerate([doing.__name__, "ok"])

@@ -1,10 +1,10 @@
 """Each check is shown to fail: defects are planted in the kernels, one at a time."""
 
 import pytest
-from freepath.check.defects import DEFECTS, Defect, caught
-from freepath.check.rig import Change
 
 from checks.support import CHECKS
+from freepath.checks.defects import DEFECTS, Defect, caught
+from freepath.checks.rig import Change
 
 BY_NAME = {check.name: check for check in CHECKS}
 

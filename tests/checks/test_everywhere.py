@@ -6,14 +6,15 @@ import sys
 from xml.etree import ElementTree
 
 import pytest
-from freepath import drivers, selection, trial
-from freepath.check import everywhere, worker
-from freepath.check.model import TINY, Check
-from freepath.check.outcome import Outcome
+
+from freepath.checks import everywhere, worker
+from freepath.checks.model import TINY, Check
+from freepath.checks.outcome import Outcome
 from freepath.cli import main
-from freepath.drivers import Driver
+from freepath.device import drivers, selection, trial
+from freepath.device.drivers import Driver
+from freepath.device.selection import Part
 from freepath.errors import DriverLimitError
-from freepath.selection import Part
 
 READS_NOTHING = """/*---
 title: A tracker that reads what nobody has written

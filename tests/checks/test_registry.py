@@ -1,12 +1,12 @@
 """The registry: what must hold for every check that is in it."""
 
 import pytest
-from freepath import catalog
-from freepath.check import registry
-from freepath.check.model import BUDGET, GROUPS, LABELS, LEVEL, MOST_CHECKS
-from freepath.errors import NothingMatchedError, UsageError
 
 from checks.support import CHECKS
+from freepath.checks import registry
+from freepath.checks.model import BUDGET, GROUPS, LABELS, LEVEL, MOST_CHECKS
+from freepath.compose import catalog
+from freepath.errors import NothingMatchedError, UsageError
 
 
 def test_names_are_unique_and_fit_for_a_command_line():

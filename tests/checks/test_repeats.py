@@ -5,15 +5,18 @@ import re
 
 import numpy as np
 import pytest
-from freepath.check import worker
-from freepath.check.media import MEDIA
-from freepath.check.model import Check
-from freepath.check.outcome import Outcome
-from freepath.check.parts import Lanes
-from freepath.check.repeats import false_alarms, of_devices, small_p_values
-from freepath.check.rig import MOST_SCENES
-from freepath.check.truth import cut, depth_at
-from freepath.check.verdict import (
+from scipy import stats
+
+from checks.support import CHECKS
+from freepath.checks import worker
+from freepath.checks.media import MEDIA
+from freepath.checks.model import Check
+from freepath.checks.outcome import Outcome
+from freepath.checks.parts import Lanes
+from freepath.checks.repeats import false_alarms, of_devices, small_p_values
+from freepath.checks.rig import MOST_SCENES
+from freepath.checks.truth import cut, depth_at
+from freepath.checks.verdict import (
     Failure,
     NotApplicable,
     chance_of_smallest,
@@ -22,9 +25,6 @@ from freepath.check.verdict import (
     sidak,
 )
 from freepath.scene import cache
-from scipy import stats
-
-from checks.support import CHECKS
 
 BY_NAME = {check.name: check for check in CHECKS}
 FIXED = {"orthographic": {"resolution": 4}}

@@ -4,8 +4,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from freepath.check import cases
-from freepath.check.identities import (
+
+from freepath.checks import cases
+from freepath.checks.identities import (
     check_clean,
     check_empty,
     check_independence,
@@ -13,8 +14,8 @@ from freepath.check.identities import (
     largest_event,
     violations_by_rounding,
 )
-from freepath.check.verdict import Failure
-from freepath.stats import Moments
+from freepath.checks.verdict import Failure
+from freepath.measure.stats import Moments
 
 ROUNDING = 2.0**-24
 COUNT = 2048

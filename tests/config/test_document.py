@@ -1,6 +1,7 @@
 import time
 
 import pytest
+
 from freepath.config.document import Document, path_text
 from freepath.errors import ConfigError
 

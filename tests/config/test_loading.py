@@ -3,6 +3,7 @@ import random
 import re
 
 import pytest
+
 from freepath import config
 from freepath.errors import ConfigError
 

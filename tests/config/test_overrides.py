@@ -1,4 +1,5 @@
 import pytest
+
 from freepath.config.overrides import parse_all
 from freepath.errors import ConfigError
 

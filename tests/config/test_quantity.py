@@ -3,8 +3,9 @@ import sys
 
 import jsonschema
 import pytest
-from freepath.config.quantity import UNITS, Number, convert
 from pydantic_core import PydanticCustomError
+
+from freepath.config.quantity import UNITS, Number, convert
 
 
 def refusal(rule, value):

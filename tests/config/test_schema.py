@@ -2,12 +2,13 @@ import json
 
 import jsonschema
 import pytest
-from freepath import catalog, config
-from freepath.config.document import Document
-from freepath.config.schema import json_schema
 from test_loading import BAD_MATRIX, EVERY_KIND, matrix
 
-COMMITTED = config.find("quick").parent / "schema.json"
+from freepath import config
+from freepath.cli import main
+from freepath.compose import catalog
+from freepath.config.document import Document
+from freepath.config.schema import json_schema
 
 
 @pytest.fixture(scope="module")
@@ -18,22 +19,30 @@ def validator(small_catalog):
 
 
 @pytest.fixture(scope="module")
-def committed():
-    return jsonschema.Draft202012Validator(json.loads(COMMITTED.read_text(encoding="utf-8")))
+def of_all():
+    return jsonschema.Draft202012Validator(json_schema(catalog.load().parameter_models()))
 
 
-def test_the_committed_schema_is_current():
-    current = json_schema(catalog.load().parameter_models())
-    assert json.loads(COMMITTED.read_text(encoding="utf-8")) == current, (
-        "run: python -m freepath.catalog configs/schema.json"
+def test_the_command_writes_it(tmp_path, capsys):
+    assert main(["schema", "-o", str(tmp_path / "schema.json")]) == 0
+    assert main(["schema"]) == 0
+    text = (tmp_path / "schema.json").read_text("utf-8")
+    assert capsys.readouterr().out == text
+    assert json.loads(text) == json_schema(catalog.load().parameter_models())
+
+
+def test_the_command_refuses_what_it_cannot_write(tmp_path, capsys):
+    assert main(["schema", "-o", str(tmp_path)]) == 2
+    assert capsys.readouterr().err == (
+        f"freepath: {tmp_path}: expected a file that can be written: Is a directory\n"
     )
 
 
 @pytest.mark.parametrize("name", config.shipped())
-def test_every_config_that_ships_is_accepted(name, committed):
+def test_every_config_that_ships_is_accepted(name, of_all):
     path = config.find(name)
     data = Document.parse(name, path.read_text(encoding="utf-8")).data
-    assert [error.message for error in committed.iter_errors(data)] == []
+    assert [error.message for error in of_all.iter_errors(data)] == []
     assert config.load(path, catalog.load().parameter_models()).name == name
 
 

@@ -5,8 +5,9 @@ from math import prod
 
 import numpy as np
 import pytest
-from freepath.check.identities import check_variance
-from freepath.check.verdict import Failure
+
+from freepath.checks.identities import check_variance
+from freepath.checks.verdict import Failure
 from support import march_moments
 from support.derivations import AlongRays, TrackLength, delta
 from support.march_moments import COEFFICIENTS, Telescoping, UnbiasedMarch, square_of_order

@@ -4,11 +4,12 @@ import json
 import shutil
 
 import pytest
-from freepath import catalog
-from freepath.check.cases import check_case
-from freepath.check.suite.identity import WALKS, cases_of
-from freepath.check.verdict import sidak
+
+from freepath.checks.cases import check_case
+from freepath.checks.suite.identity import WALKS, cases_of
+from freepath.checks.verdict import sidak
 from freepath.cli import main
+from freepath.compose import catalog
 
 # Free probabilities for real and null, with the sign of sigma_n in the weight: unbiased for any
 # majorant, and delta tracking where it bounds.

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
-from freepath.check.identities import check_count, check_mean, check_variance
-from freepath.check.verdict import sidak
-from freepath.stats import Moments
+
+from freepath.checks.identities import check_count, check_mean, check_variance
+from freepath.checks.verdict import sidak
+from freepath.measure.stats import Moments
 from support.derivations import (
     AlongRays,
     Chain,

@@ -1,7 +1,8 @@
 """What once went wrong, with the seed that showed it."""
 
 import pytest
-from freepath.check.identities import check_clean
+
+from freepath.checks.identities import check_clean
 
 
 @pytest.mark.parametrize("tracker", ["residual_ratio", "weighted_decomposition"])

@@ -1,6 +1,6 @@
 """Where a path ends does not depend on what is asked of it."""
 
-from freepath.check.cases import check_distribution
+from freepath.checks.cases import check_distribution
 
 
 def test_delta_in_a_transmittance_kernel(rig):

@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from freepath.check.identities import check_same_samples
+
+from freepath.checks.identities import check_same_samples
 
 SAMPLES = 2048
 TRACKERS = {

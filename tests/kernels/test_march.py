@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
-from freepath.check.identities import check_mean, check_order
-from freepath.check.truth import depth_at
-from freepath.check.verdict import sidak
+
+from freepath.checks.identities import check_mean, check_order
+from freepath.checks.truth import depth_at
+from freepath.checks.verdict import sidak
 from freepath.scene.special import NODES, WEIGHTS
 
 # Smooth and curved along every ray: where sigma_t has kinks the order is another.

@@ -4,10 +4,11 @@ import itertools
 
 import numpy as np
 import pytest
-from freepath.check.identities import check_count, check_mean, check_variance
-from freepath.check.media import MAJORANTS, MEDIA
-from freepath.check.truth import MajorantAlongRays
-from freepath.check.verdict import sidak
+
+from freepath.checks.identities import check_count, check_mean, check_variance
+from freepath.checks.media import MAJORANTS, MEDIA
+from freepath.checks.truth import MajorantAlongRays
+from freepath.checks.verdict import sidak
 
 SAMPLES = 4096
 # Beyond this optical depth the weights of ratio tracking have so heavy a tail that the variance of

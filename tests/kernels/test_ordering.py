@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
-from freepath.check.verdict import sidak
 from scipy import stats
+
+from freepath.checks.verdict import sidak
 
 # One ray down an exponential atmosphere, many times.
 LINES = (np.full((64, 3), (0.3, 0.4, 0.0)), np.full((64, 3), (0.0, 0.0, 1.0)))

@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
-from freepath import effects, runner
-from freepath.check.identities import check_mean
-from freepath.check.rig import Change
+
+from freepath.checks.identities import check_mean
+from freepath.checks.rig import Change
+from freepath.compose import light_paths as effects
+from freepath.measure import runner
 
 GRID = {"cloud": {"resolution": 16, "interpolation": "trilinear"}}
 POINT = {"point": {"position": [0.3, 0.4, 2.0], "intensity": 10}}

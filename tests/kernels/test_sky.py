@@ -3,9 +3,10 @@
 import numpy as np
 import OpenImageIO as oiio
 import pytest
-from freepath.check.identities import check_mean
-from freepath.check.rig import Change
-from freepath.stats import Moments
+
+from freepath.checks.identities import check_mean
+from freepath.checks.rig import Change
+from freepath.measure.stats import Moments
 
 ALPHA = 1e-4
 RAYS = {"chords": {"count": 256}}

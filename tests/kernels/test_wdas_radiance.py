@@ -5,8 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from freepath.check.verdict import require
 from scipy import stats
+
+from freepath.checks.verdict import require
 
 FILE = "wdas_cloud_sixteenth.vdb"
 FOLDERS = [Path(part) for part in os.environ.get("FREEPATH_VOLUMES", "").split(os.pathsep) if part]

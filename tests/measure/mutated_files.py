@@ -94,7 +94,7 @@ def write_sky(path):
 
 
 def write_vdb(path):
-    from freepath.scene import openvdb
+    from freepath.scene.volumes import openvdb
 
     code = (
         "import sys, numpy as np, pyopenvdb as vdb\n"
@@ -116,14 +116,14 @@ def write_rays(path):
 
 
 def read_volume(path):
-    from freepath.scene.volumes import extinction, read_volume
+    from freepath.scene.volumes.reading import extinction, read_volume
 
     volume = read_volume(path)
     return extinction(volume.densities, 1.0, path)
 
 
 def read_sky(path):
-    from freepath.scene.sky import read_sky
+    from freepath.scene.lights.sky import read_sky
 
     return read_sky(SimpleNamespace(file=str(path), scale=1.0), 1).table
 
@@ -136,7 +136,7 @@ def read_rays(path):
 
 @functools.cache
 def trackers():
-    from freepath import catalog
+    from freepath.compose import catalog
 
     return catalog.load([]).parameter_models()
 

@@ -3,10 +3,11 @@
 from types import SimpleNamespace
 
 import numpy as np
-from freepath.scene.gaussian import Gaussian
-from freepath.scene.grid import GridMedium
-from freepath.scene.media import Cosine, Exponential, Homogeneous, Layered, Linear
 from scipy.integrate import quad
+
+from freepath.scene.media.formulas import Cosine, Exponential, Homogeneous, Layered, Linear
+from freepath.scene.media.gaussian import Gaussian
+from freepath.scene.media.grid import GridMedium
 
 SIZE = (1.5, 2.0, 3.0)
 

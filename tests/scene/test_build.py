@@ -2,10 +2,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+
 from freepath.errors import VolumeError
 from freepath.scene import build_medium
-from freepath.scene.cloud import cloud
-
+from freepath.scene.media.cloud import cloud
 from scene.helpers import volume_model
 
 SIZE = (1.0, 2.0, 4.0)
@@ -102,7 +102,8 @@ def test_a_scaled_cloud_that_overflows_is_refused():
 def test_a_transform_that_flattens_is_refused(tmp_path, monkeypatch):
     flat = np.diag([1.0, 0.0, 1.0, 0.0])[:3]
     monkeypatch.setattr(
-        "freepath.scene.openvdb.read_openvdb", lambda *_: (np.ones((2, 2, 2)), flat, (0, 0, 0), "")
+        "freepath.scene.volumes.openvdb.read_openvdb",
+        lambda *_: (np.ones((2, 2, 2)), flat, (0, 0, 0), ""),
     )
     (tmp_path / "v.vdb").write_text("never read")
     with pytest.raises(VolumeError, match="its transform cannot be inverted"):

@@ -2,6 +2,7 @@ import os
 
 import numpy as np
 import pytest
+
 from freepath.scene.cache import cache_dir, cached
 
 

@@ -2,7 +2,8 @@ import hashlib
 
 import numpy as np
 import pytest
-from freepath.scene.cloud import cloud
+
+from freepath.scene.media.cloud import cloud
 
 PINNED = {
     (32, 1): "60917ea97d43a9ab9feb9dbe00f7660e",
@@ -41,7 +42,7 @@ def test_the_resolution_does_not_change_the_shape():
 
 def test_slabs_do_not_show(monkeypatch, tmp_path):
     whole = cloud(20, 1)
-    monkeypatch.setattr("freepath.scene.cloud.SLAB", 1)
+    monkeypatch.setattr("freepath.scene.media.cloud.SLAB", 1)
     monkeypatch.setenv("FREEPATH_CACHE", str(tmp_path / "other"))
     assert np.array_equal(cloud(20, 1), whole)
 

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
-from freepath.scene.grid import GridMedium
-from freepath.scene.media import Homogeneous
 
+from freepath.scene.media.formulas import Homogeneous
+from freepath.scene.media.grid import GridMedium
 from scene.helpers import segments_in, voxels
 
 pytestmark = pytest.mark.filterwarnings("error")

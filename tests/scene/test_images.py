@@ -3,10 +3,10 @@ import struct
 import numpy as np
 import pytest
 import tifffile
+
 from freepath.errors import VolumeError
 from freepath.scene import build_medium
-from freepath.scene.volumes import extinction, read_volume
-
+from freepath.scene.volumes.reading import extinction, read_volume
 from scene.helpers import volume_model, write_slices
 
 pytestmark = pytest.mark.filterwarnings("error")

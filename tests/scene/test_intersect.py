@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
+
 from freepath.scene import segments
-from freepath.scene.grid import GridMedium
-from freepath.scene.media import Homogeneous
+from freepath.scene.media.formulas import Homogeneous
+from freepath.scene.media.grid import GridMedium
 
 pytestmark = pytest.mark.filterwarnings("error")
 

@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
-from freepath.scene.closed_form import ClosedForm
-from freepath.scene.gaussian import Gaussian
-from freepath.scene.media import Cosine, Exponential, Homogeneous, Layered, Linear
-from freepath.scene.medium import Medium
 
+from freepath.scene.media.base import Medium
+from freepath.scene.media.closed_form import ClosedForm
+from freepath.scene.media.formulas import Cosine, Exponential, Homogeneous, Layered, Linear
+from freepath.scene.media.gaussian import Gaussian
 from scene.helpers import CLOSED_FORMS, MEDIA, SIZE, borders_of, cut, integrate, segments_in
 
 pytestmark = pytest.mark.filterwarnings("error")
@@ -76,7 +76,7 @@ def test_pieces_add_up_to_the_segment(medium):
 def test_chunks_do_not_change_the_depth(medium, monkeypatch):
     segments = segments_in(medium.extent)
     whole = medium.optical_depth(segments)
-    monkeypatch.setattr("freepath.scene.medium.CELLS_PER_CHUNK", 1)
+    monkeypatch.setattr("freepath.scene.media.base.CELLS_PER_CHUNK", 1)
     np.testing.assert_array_equal(medium.optical_depth(segments), whole)
 
 

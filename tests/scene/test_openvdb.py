@@ -5,9 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from freepath.errors import VolumeError
-from freepath.scene import build_medium, openvdb, openvdb_header, openvdb_reader
 
+from freepath.errors import VolumeError
+from freepath.scene import build_medium
+from freepath.scene.volumes import openvdb, openvdb_header, openvdb_reader
 from scene.helpers import volume_model
 
 MAKE_GRIDS = """

@@ -2,10 +2,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+
 from freepath.errors import FreepathError, VolumeError
 from freepath.scene import make_rays, segments
-from freepath.scene.grid import GridMedium
-from freepath.scene.media import Homogeneous
+from freepath.scene.media.formulas import Homogeneous
+from freepath.scene.media.grid import GridMedium
 from freepath.scene.ray_files import COLUMNS
 
 pytestmark = pytest.mark.filterwarnings("error")

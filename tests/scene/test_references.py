@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
-from freepath.scene import reference, references
-from freepath.scene.grid import GridMedium
-from freepath.scene.media import Exponential, Homogeneous, Layered, Linear
 from scipy.special import erfc, exp1
 
+from freepath.scene import reference, references
+from freepath.scene.media.formulas import Exponential, Homogeneous, Layered, Linear
+from freepath.scene.media.grid import GridMedium
 from scene.helpers import MEDIA, SIZE, borders_of, cut, integrate, segments_in, voxels
 
 pytestmark = pytest.mark.filterwarnings("error")

@@ -3,11 +3,12 @@
 import numpy as np
 import OpenImageIO as oiio
 import pytest
+
 from freepath import cli
+from freepath.compose.light_paths import SKY_COLUMNS, SKY_ROWS
 from freepath.config.lights import Image
-from freepath.effects import SKY_COLUMNS, SKY_ROWS
 from freepath.errors import VolumeError
-from freepath.results import read_rows
+from freepath.results.folder import read_rows
 from freepath.scene import read_sky
 
 CONFIG = """\

@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
-from freepath.scene import special
 from scipy.integrate import quad
+
+from freepath.scene import special
 
 
 @pytest.mark.parametrize(

@@ -2,9 +2,10 @@ import os
 
 import numpy as np
 import pytest
+
 from freepath.errors import VolumeError
-from freepath.scene.files import find_file
-from freepath.scene.volumes import extinction, read_volume
+from freepath.scene.volumes.files import find_file
+from freepath.scene.volumes.reading import extinction, read_volume
 
 pytestmark = pytest.mark.filterwarnings("error")
 
@@ -152,7 +153,7 @@ def test_records_with_names_in_any_script_are_refused(tmp_path):
 
 def test_too_many_voxels_are_refused(tmp_path, monkeypatch):
     np.save(tmp_path / "v.npy", DENSITIES)
-    monkeypatch.setattr("freepath.scene.volumes.MOST_VOXELS", 23)
+    monkeypatch.setattr("freepath.scene.volumes.reading.MOST_VOXELS", 23)
     with pytest.raises(VolumeError, match="24 voxels, expected at most 23"):
         read_volume(tmp_path / "v.npy")
 

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from freepath import majorants
-from freepath.check.rig import Flight
-from freepath.scene import Medium
 from numpy.typing import NDArray
 from scipy import stats
+
+from freepath.checks.rig import Flight
+from freepath.scene import Medium, majorants
 
 Array = NDArray[np.float64]
 

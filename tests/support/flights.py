@@ -1,4 +1,5 @@
-"""What tests/test_devices_all.py runs in the process of each driver: `python -m support.flights`.
+"""What tests/device/test_devices_all.py runs in the process of each driver: `python -m
+support.flights`.
 
 Every case's samples go to one file, so that drivers can be held against each other; what failed is
 kept as the message that a user would get.
@@ -12,12 +13,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from freepath import catalog, device
-from freepath.check.rig import Rig
-from freepath.check.suite.identity import WALKS, Axes, cases_of, name_of
-from freepath.device import Device
+
+from freepath.checks.rig import Rig
+from freepath.checks.suite.identity import WALKS, Axes, cases_of, name_of
+from freepath.compose import catalog
+from freepath.compose.source import Source
+from freepath.device import opencl as device
+from freepath.device.opencl import Device
 from freepath.errors import FreepathError
-from freepath.source import Source
 
 RAYS, SAMPLES = 12, 4
 DEFECTS = {

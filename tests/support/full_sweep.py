@@ -9,12 +9,13 @@ import argparse
 import math
 from pathlib import Path
 
-from freepath import catalog, recommend
 from freepath.commands.common import volume_of
 from freepath.commands.recommend import told_of
-from freepath.selection import one_device
-from freepath.sweep import Clock, Listener
-from freepath.table import seconds
+from freepath.compose import catalog
+from freepath.device.selection import one_device
+from freepath.extras import recommend
+from freepath.measure.sweep import Clock, Listener
+from freepath.show.table import seconds
 
 
 def search_of(options: argparse.Namespace) -> recommend.Search:

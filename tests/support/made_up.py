@@ -1,6 +1,6 @@
 """Drivers that nobody has."""
 
-from freepath.drivers import Driver
+from freepath.device.drivers import Driver
 
 
 def made_up(name="made-up", found="yes", **given):

@@ -5,7 +5,7 @@ import itertools
 import shutil
 from pathlib import Path
 
-from freepath.results import RUN, SUMMARY, read_rows
+from freepath.results.folder import RUN, SUMMARY, read_rows
 
 
 def many(result: Path, folder: Path, count: int = 10_000, media: int = 5) -> Path:

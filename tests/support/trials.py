@@ -16,10 +16,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from freepath.compare.judging import Settings, compare
-from freepath.compare.pairing import Key, Run, Side, load
-from freepath.compare.timing import effects
 from scipy import stats
+
+from freepath.show.compare.judging import Settings, compare
+from freepath.show.compare.pairing import Key, Run, Side, load
+from freepath.show.compare.timing import effects
 
 Plant = Callable[[Side, Key], None]
 

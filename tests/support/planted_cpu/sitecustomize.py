@@ -11,10 +11,10 @@ import sys
 
 
 class Plant:
-    """Finds freepath.cpu_name as ever, and plants before it can mend."""
+    """Finds freepath.device.cpu_name as ever, and plants before it can mend."""
 
     def find_spec(self, name, path=None, target=None):
-        if name != "freepath.cpu_name":
+        if name != "freepath.device.cpu_name":
             return None
         sys.meta_path.remove(self)
         spec = importlib.util.find_spec(name)

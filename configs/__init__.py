@@ -1,1 +1,0 @@
-"""Sweeps that ship with freepath; `freepath run NAME` finds them by name."""

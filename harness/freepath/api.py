@@ -1,0 +1,135 @@
+"""freepath from Python: run a config, load a result; both give a table."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from freepath.errors import RunError
+from freepath.results.folder import SUMMARY, ResultFolder, read_rows, records
+
+if TYPE_CHECKING:
+    from freepath.cases.plan import Case
+    from freepath.compose.catalog import Catalog
+    from freepath.config import Config
+    from freepath.device.opencl import Device
+    from freepath.device.selection import Parts
+    from freepath.measure.sweep import Sweep
+
+
+def sweep(  # noqa: PLR0913 (what a sweep is made of; most has a default)
+    config: str | Path | Config,
+    output: str | Path | None = None,
+    *,
+    devices: Sequence[Device],
+    axes: Sequence[str] = (),
+    known: Catalog | None = None,
+    cases: list[Case] | None = None,
+    resume: bool = False,
+    confirm: bool = False,
+    **more: Any,
+) -> Sweep:
+    """Make a sweep, whose `run()` measures it.
+
+    `config` is a path, the name of a config that ships, or one that is loaded; `output` the folder
+    for the results (default: results/NAME-TIME, with `resume` the newest of these). `devices` are
+    open; `axes` are what -a takes. `known` are the trackers (default: the
+    shipped ones), `cases` those of the config that are wanted (default: all). A `listener` and a
+    `clock` may be given. Raises FreepathError with the message that the command line prints.
+    """
+    from freepath import config as configs
+    from freepath.cases import plan
+    from freepath.compose import catalog
+    from freepath.measure.sweep import Sweep
+    from freepath.results import folder as results
+
+    known = known or catalog.load()
+    if isinstance(config, (str, Path)):
+        config = configs.load(configs.find(str(config)), known.parameter_models(), list(axes))
+    cases = cases or plan.expand(config, known)
+    path = output or (results.newest_folder if resume else results.new_folder)(config.name)
+    folder = ResultFolder(Path(path), resume=resume, confirm=confirm)
+    return Sweep(config, known, cases, list(devices), folder, confirm=confirm, **more)
+
+
+def run(
+    config: str | Path,
+    output: str | Path | None = None,
+    *,
+    devices: Sequence[str] = (),
+    axes: Sequence[str] = (),
+    progress: Callable[[float, int, str], None] | bool = True,
+) -> Any:
+    """Run a config, a path or the name of one that ships, as `freepath run` does.
+
+    `output` is the folder for the results (default: results/NAME-TIME), `devices` and `axes` are
+    what -d and -a take. `progress` is told how many cases are done, of how many, and what is being
+    done; True prints a line a case. Returns what `load` does. Raises FreepathError with the message
+    that the command line prints, and KeyboardInterrupt with what was measured left in the folder.
+    """
+    from freepath.device import selection
+    from freepath.measure.sweep import Listener
+
+    listener = Listener()
+    if progress is True:
+        listener.row = _say
+    elif callable(progress):
+        listener.progress = progress
+    parts = selection.checked(selection.resolve(list(devices)))
+    if not selection.can_be_here(parts):
+        return load(_run_elsewhere(config, output, parts, axes, quiet=progress is not True))
+    opened = selection.opened(parts)
+    prepared = sweep(config, output, devices=opened, axes=axes, listener=listener)
+    prepared.run()
+    return load(prepared.folder.folder)
+
+
+def _run_elsewhere(
+    config: str | Path, output: str | Path | None, parts: Parts, axes: Sequence[str], *, quiet: bool
+) -> Path:
+    """Run a config on drivers that this process cannot see, each in its own; returns the folder."""
+    from freepath import config as configs
+    from freepath.compose import catalog
+    from freepath.device import drivers, selection
+    from freepath.results import folder as results
+
+    path = configs.find(str(config))
+    loaded = configs.load(path, catalog.load().parameter_models(), list(axes))
+    folder = ResultFolder(Path(output or results.new_folder(loaded.name)))
+    for driver, infos, failure in parts:
+        command = ["run", str(path), "-o", str(folder.folder), "--rows-only"]
+        command += [word for info in infos for word in ("-d", selection.selector_of(info))]
+        command += [word for axis in axes for word in ("-a", axis)]
+        command += ["--resume"] * folder.holds_rows
+        ended = None if failure else drivers.in_process_of(driver, command, capture=quiet)
+        if failure or ended.returncode:
+            why = failure or drivers.how_it_ended(driver, ended.returncode)
+            raise RunError("\n".join(filter(None, (why, ended and ended.stderr))))
+    return folder.folder
+
+
+def _say(row: dict[str, Any]) -> None:
+    print(f"{row['status']:>8}  {row['case']}")
+
+
+def load(result: str | Path) -> Any:
+    """A row a case of a result: a pandas.DataFrame, or a list of records where pandas is missing.
+
+    Numbers are floats or integers (infinite where a bias stands in the way), unknown cells None or
+    NaN. Raises FreepathError where the folder holds no result of this schema version.
+    """
+    from freepath.errors import FreepathError
+
+    summary = Path(result) / SUMMARY
+    if not summary.is_file():
+        raise FreepathError(f"{result}: expected the folder of a run, with {SUMMARY} in it")
+    found = [
+        {name: float("inf") if value == "inf" else value for name, value in row.items()}
+        for row in records(read_rows(summary))
+    ]
+    try:
+        import pandas
+    except ImportError:
+        return found
+    return pandas.DataFrame(found)

@@ -1,0 +1,109 @@
+"""Variances and costs agree with what is known of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from freepath.checks.identities import check_count, check_mean, check_variance
+from freepath.checks.media import MAJORANTS, MEDIA
+from freepath.checks.model import Check
+from freepath.checks.rig import Flight, Rig
+from freepath.checks.suite import expectations as known
+from freepath.checks.truth import MajorantAlongRays
+from freepath.checks.verdict import demand
+from freepath.compose.catalog import Catalog
+
+SAMPLES = 4096
+THICKEST = 2.0
+"""The optical depth beyond which weights have so heavy a tail that the variance of a sample says
+little about the variance."""
+RELATIVES: dict[str, tuple[dict[str, Any], float, Callable[..., known.Expected]]] = {
+    "weighted_delta": ({}, 1.5, known.free(1.0)),
+    "weighted_delta-not-bounded": ({}, 0.8, known.free(1.0)),
+    "weighted_delta-analog": ({"probability": "analog"}, 1.5, known.binary),
+    "weighted_delta-no_absorption": (
+        {"probability": "no_absorption"}, 1.5, known.free(1.0, albedo=0.8)
+    ),
+    "two_knob-0.3": ({"acceptance": 0.3}, 1.5, known.free(0.3)),
+    "two_knob-3": ({"acceptance": 3}, 1.5, known.free(3.0)),
+    "split": ({}, 1.5, known.ratio),
+    "residual_ratio": ({}, 1.5, known.residual_ratio),
+    "residual_ratio-1.2": ({"control": "minorant", "share": 1.2}, 1.5, known.residual_ratio),
+    "decomposition": ({}, 1.5, known.binary),
+    "weighted_decomposition": ({"share": 0.3}, 1.5, known.weighted_decomposition),
+    "next_flight_delta": ({}, 1.5, known.cost_of(known.binary)),
+    "next_flight_ratio": ({}, 1.5, known.cost_of(known.ratio)),
+    "track_length": ({}, 1.5, known.track_length_cost),
+}  # fmt: skip
+
+
+def checks(catalog: Catalog) -> Iterator[Check]:
+    """Of delta and ratio tracking in every medium, of their relatives in two."""
+    for tracker, expected in EXACT.items():
+        for m, medium in enumerate(MEDIA):
+            for j, majorant in enumerate(MAJORANTS):
+                axes = {"tracker": tracker, "medium": medium, "majorant": majorant}
+                axes |= {"tightness": 1.5, "lanes": (16, 1)[(m + j) % 2]}
+                yield _check(f"{tracker}/{medium}/{majorant}", tracker, axes, expected)
+    for name, (parameters, tightness, known_of) in RELATIVES.items():
+        tracker = name.partition("-")[0]
+        for medium in ("exponential", "trilinear"):
+            axes = {"tracker": {tracker: parameters}, "medium": medium, "tightness": tightness}
+            expected = partial(_relative, known_of)
+            yield _check(f"{name}/{medium}/global", tracker, axes | {"lanes": 16}, expected)
+
+
+def _check(name: str, tracker: str, axes: dict[str, Any], expected: Any) -> Check:
+    speed = "fast" if "/trilinear/" in name and tracker in EXACT else "slow"
+    kernels = f"{tracker}/transmittance/{name.partition('/')[2]}"
+    options = {"kernels": kernels, "axes": axes, "expected": expected}
+    return Check.of(f"moments/{name}", (speed, "moments", tracker), as_derived, **options)
+
+
+def _relative(known_of: Callable[..., known.Expected], flight: Flight) -> known.Expected:
+    along = known.AlongRays(flight)
+    second, lookups = known_of(along)
+    return None if second is None else second - along.transmittance**2, lookups
+
+
+def as_derived(
+    rig: Rig, alpha: float, axes: dict[str, Any], expected: Callable[[Flight], known.Expected]
+) -> None:
+    """An estimator may be right on average and play where it should weigh, or look up twice: its
+    variance and its lookups must be those that are derived for it."""
+    flight = rig.flight(**axes)
+    variance, lookups = expected(flight)
+    samples = flight.record(SAMPLES)
+    check_mean(samples.round.moments, flight.reference(), alpha / 3)
+    check_count(samples.lookups, lookups, alpha / 3)
+    thin = flight.depth <= THICKEST
+    demand(np.count_nonzero(thin) > 100, "too few rays are thin enough")
+    if variance is not None:
+        check_variance(samples.score[thin], variance[thin], alpha / 3)
+    total = samples.lookups.sum()
+    counted = samples.round.counters["lookups"]
+    demand(total == counted, f"{counted} lookups in all, {total:.0f} in single samples")
+
+
+def _along(flight: Flight) -> MajorantAlongRays:
+    case = flight.case
+    return MajorantAlongRays(case.majorant, flight.medium, case.tightness, flight.segments)
+
+
+def _delta(flight: Flight) -> known.Expected:
+    transmittance = flight.reference()
+    variance = transmittance * (1.0 - transmittance)
+    return variance, _along(flight).collisions_until_real()
+
+
+def _ratio(flight: Flight) -> known.Expected:
+    depth, majorant = flight.depth, _along(flight)
+    variance = np.exp(-2.0 * depth) * np.expm1(majorant.square_over_majorant())
+    return variance, majorant.tentative_collisions()
+
+
+EXACT: dict[str, Callable[[Flight], known.Expected]] = {"delta": _delta, "ratio": _ratio}

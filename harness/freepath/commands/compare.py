@@ -1,0 +1,197 @@
+"""`freepath compare`: what became faster, slower, noisier or different."""
+
+from __future__ import annotations
+
+from argparse import ArgumentTypeError, Namespace
+from pathlib import Path
+from typing import Any
+
+import shtab
+
+from freepath.commands.arguments import number_or_percent
+
+REGRESSION = 1
+FORMATS = ("text", "csv", "html", "json", "md")
+
+
+def add(commands: Any) -> None:
+    """Declare its arguments."""
+    compare = commands.add_parser(
+        "compare",
+        help="compare results with a reference",
+        description="Compare results case by case: times by repeated rounds, variances, estimates "
+        "by z, lookups exactly. Ratios are contender / reference. REFERENCE and CONTENDER are "
+        "folders of a run, or folders that hold several runs of the same sweep, which tells far "
+        "more about times.",
+        epilog="exit codes: 0 no verdict of --fail-on; 1 one of them; 2 usage, or results that "
+        "should not be compared",
+        allow_abbrev=False,
+    )
+    compare.add_argument(
+        "reference", type=Path, metavar="REFERENCE", help="what to compare with"
+    ).complete = shtab.DIRECTORY
+    compare.add_argument(
+        "contender", type=Path, nargs="+", metavar="CONTENDER", help="what to judge; may be several"
+    ).complete = shtab.DIRECTORY
+    compare.add_argument(
+        "--alpha",
+        type=_share,
+        default=0.05,
+        metavar="A",
+        help="expected share of false findings among the findings (default: 0.05)",
+    )
+    compare.add_argument(
+        "--factor",
+        type=_ratio,
+        default=1.01,
+        metavar="F",
+        help="ratio of times, variances or estimates that is too small to matter, as 1.05 or 5%% "
+        "(default: 1.01)",
+    )
+    compare.add_argument(
+        "--drift",
+        type=_ratio,
+        metavar="F",
+        help="ratio by which all times of a scene may differ between runs of the machine without "
+        "a reason, to be taken out of each case (default: all of it, unless several runs on either "
+        "side show that it is no drift)",
+    )
+    compare.add_argument("--no-times", action="store_true", help="do not compare times")
+    compare.add_argument("--all", action="store_true", help="print the cases that did not change")
+    compare.add_argument(
+        "--other-machine",
+        action="store_true",
+        help="compare results of different machines nevertheless",
+    )
+    compare.add_argument(
+        "--fail-on",
+        type=_words,
+        default=("SLOWER", "MORE_NOISE", "DIFFERENT", "MISSING"),
+        metavar="WORDS",
+        help="verdicts that make exit code 1, e.g. SLOWER,UNDECIDED, or none (default: "
+        "SLOWER,MORE_NOISE,DIFFERENT,MISSING)",
+    )
+    compare.add_argument("--format", choices=FORMATS, help="what to write")
+    for name in ("json", "md"):
+        compare.add_argument(
+            f"--{name}",
+            action="store_const",
+            dest="format",
+            const=name,
+            help=f"the same as --format {name}",
+        )
+    compare.add_argument(
+        "-o", "--output", type=Path, metavar="FILE", help="a .csv, .html, .json or .md to write"
+    ).complete = shtab.FILE
+    compare.add_argument(
+        "--output-junit", type=Path, metavar="FILE", help="write verdicts as JUnit XML"
+    ).complete = shtab.FILE
+
+
+def _share(text: str) -> float:
+    value = number_or_percent(text)
+    if not 0 < value < 1:
+        raise ArgumentTypeError(f"expected a share between 0 and 1, as 0.05 or 5%, got '{text}'")
+    return value
+
+
+def _ratio(text: str) -> float:
+    value = number_or_percent(text) + ("%" in text)
+    if not 1 <= value < 1e6:
+        raise ArgumentTypeError(
+            f"expected a ratio of 1 or more, as 1.05, or what it is above 1, as 5%, got '{text}'"
+        )
+    return value
+
+
+def _words(text: str) -> tuple[str, ...]:
+    from freepath.show.compare import VERDICTS
+
+    words = [word.strip().upper() for word in text.split(",") if word.strip()]
+    for word in words:
+        if word not in (*VERDICTS, "NONE"):
+            known = ", ".join(VERDICTS)
+            raise ArgumentTypeError(f"expected words of {known}, or none, got '{word}'")
+    return tuple(words)
+
+
+def execute(options: Namespace) -> int:
+    """Run it; returns the exit code."""
+    from freepath.errors import FreepathError
+    from freepath.show import compare
+
+    wanted = _format(options)
+    reference = compare.load(options.reference)
+    sides = [compare.load(path) for path in options.contender]
+    for side in sides:
+        reason = compare.unpaired(reference, side)
+        if reason:
+            raise FreepathError(f"{reference.name} and {side.name}: {reason}")
+        reason = "" if options.other_machine else compare.refuse(reference, side)
+        if reason:
+            raise FreepathError(
+                f"{reference.name} and {side.name}: {reason}; --other-machine compares them anyway"
+            )
+    settings = compare.Settings(
+        options.alpha, options.factor, options.drift, times=not options.no_times
+    )
+    found = [compare.compare(reference, side, settings) for side in sides]
+    _write(options, wanted, reference, sides, (found, settings.to_show))
+    words = {one.verdict for judged, _ in found for one in judged}
+    return REGRESSION if words & set(options.fail_on) else 0
+
+
+def _format(options: Namespace) -> str:
+    from freepath.errors import FreepathError
+
+    suffix = options.output.suffix.lower()[1:] if options.output else "text"
+    wanted = options.format or suffix
+    if wanted not in FORMATS or (options.output and wanted == "text"):
+        raise FreepathError(
+            f"{options.output}: expected a name that ends in .csv, .html, .json or .md"
+        )
+    return wanted
+
+
+def _write(
+    options: Namespace, wanted: str, reference: Any, sides: list, told: tuple[list, float]
+) -> None:
+    from freepath.errors import FreepathError
+    from freepath.show.compare import showing
+
+    found, to_show = told
+    names, results = [side.name for side in sides], [judged for judged, _ in found]
+    made = {
+        "csv": lambda: showing.as_csv(names, results),
+        "html": lambda: showing.as_html(reference.name, names, results),
+        "json": lambda: showing.as_json(names, results),
+        "md": lambda: showing.as_markdown(reference.name, names, results, to_show),
+    }
+    path = options.output_junit
+    try:
+        if path:
+            showing.write_junit(path, names, results, options.fail_on)
+        path = options.output
+        if path:
+            path.write_text(made[wanted](), encoding="utf-8")
+    except OSError as error:
+        raise FreepathError(f"cannot write {path}: {error.strerror}") from error
+    if wanted != "text" and not options.output:
+        print(made[wanted](), end="")
+    else:
+        _print(options, names, found, to_show)
+
+
+def _print(options: Namespace, names: list[str], found: list, to_show: float) -> None:
+    from freepath.commands.common import console_of
+    from freepath.show.compare import showing
+
+    if len(names) > 1:
+        console_of().print(showing.matrix_table(names, [judged for judged, _ in found]))
+    for name, (judged, shifts) in zip(names, found, strict=True):
+        lines = showing.lines(judged, everything=options.all) if len(names) == 1 else []
+        lines += showing.shift_lines(shifts)
+        lines += [f"{name}: {showing.totals(judged)}", showing.undecided(judged, to_show)]
+        print("\n".join(filter(None, lines)))
+    if options.output:
+        print(f"wrote {options.output}")

@@ -1,0 +1,308 @@
+"""`freepath run`: a sweep, its progress, its table and its result files."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import sys
+import time
+from argparse import Namespace
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import shtab
+
+from freepath.commands.arguments import add_baseline, add_config, add_device
+from freepath.commands.common import cases_of, console_of, print_tables
+from freepath.errors import FAILED, INTERRUPTED, USAGE, UsageError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from freepath.cases.plan import Case
+    from freepath.device.drivers import Driver
+    from freepath.device.opencl import DeviceInfo
+    from freepath.device.selection import Parts
+    from freepath.measure.sweep import Listener, Sweep
+    from freepath.results.folder import ResultFolder
+
+NAMED = 3
+"""Cases of a driver that are named where it did not finish them; of more, only the number."""
+
+
+def add(commands: Any) -> None:
+    """Declare its arguments."""
+    run = commands.add_parser(
+        "run",
+        help="run a sweep",
+        description="Run the cases of a config, print a table and write summary.csv, samples.csv "
+        "and run.json.",
+        allow_abbrev=False,
+    )
+    add_config(run)
+    add_device(
+        run,
+        "part of the name, platform or driver of a device, a name that `freepath devices` shows "
+        "behind -d, or 'all'; may be repeated",
+    )
+    run.add_argument("-N", "--show-only", action="store_true", help="list the cases and stop")
+    run.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        metavar="DIR",
+        help="folder for the results (default: results/NAME-TIME)",
+    ).complete = shtab.DIRECTORY
+    run.add_argument(
+        "--resume",
+        action="store_true",
+        help="go on with the run in DIR (default: the newest of this config): rows whose config, "
+        "source, device and driver are unchanged are kept, if pictures that were wanted are there",
+    )
+    run.add_argument(
+        "--confirm",
+        action="store_true",
+        help="measure the error of each case at three more sample counts, write it beside the "
+        "prediction into confirm.csv, and tell how many predictions hold",
+    )
+    run.add_argument(
+        "--work-group",
+        type=int,
+        metavar="N",
+        help="run kernels in work-groups of N work-items (default: 1 on CPUs, and elsewhere the "
+        "fastest of a short calibration)",
+    )
+    run.add_argument("--json", action="store_true", help="print the rows as JSON, nothing else")
+    add_baseline(run)
+    # given to the process of a driver: who started it shows the rows of all
+    run.add_argument("--rows-only", action="store_true", help=argparse.SUPPRESS)
+
+
+def execute(options: Namespace) -> int:
+    """Run it; returns the exit code."""
+    started = time.perf_counter()
+    loaded, known, cases = cases_of(options)
+    if options.show_only:
+        return _show_only(options, cases)
+    if options.baseline and not any(re.search(options.baseline, case.name) for case in cases):
+        raise UsageError(f"--baseline {options.baseline}: no case has a name that matches")
+    from freepath import api
+    from freepath.device import environment, selection
+    from freepath.measure.sweep import Clock
+    from freepath.results import folder as results
+
+    load = environment.load()
+    parts = selection.checked(selection.resolve(options.device))
+    if not selection.can_be_here(parts):
+        found = results.newest_folder if options.resume else results.new_folder
+        path = options.output or found(loaded.name)
+        folder = results.ResultFolder(path, resume=options.resume, confirm=options.confirm)
+        failed = _run_in_processes(options, parts, folder, cases)
+        shown = _show(options, folder, cases, load) if folder.holds_rows else 0
+        return max(shown, failed)
+    console = console_of(stderr=options.json)
+    sweep = api.sweep(
+        loaded,
+        options.output,
+        devices=selection.opened(parts),
+        known=known,
+        cases=cases,
+        resume=options.resume,
+        confirm=options.confirm,
+        clock=Clock(started),
+        work_group=options.work_group,
+    )
+    with _shown_progress(console) as sweep.listener:
+        try:
+            sweep.run()
+        except KeyboardInterrupt:
+            _say_how_to_resume(sweep)
+            return INTERRUPTED
+    if options.rows_only:
+        return 0
+    return _show(options, sweep.folder, cases, load, sweep)
+
+
+def _run_in_processes(
+    options: Namespace, parts: Parts, folder: ResultFolder, cases: list[Case]
+) -> int:
+    """Run each driver's devices in its process, one after the other, into one folder.
+
+    Returns the exit code: FAILED where one of them crashed or could not do what was wanted; the
+    others still run. What is wrong with the config or its files is said by the first, once.
+    """
+    from freepath.device import drivers, selection
+
+    failed = 0
+    for driver, infos, failure in parts:
+        if failure:
+            print(f"freepath: {driver.name} cannot be used here: {failure}", file=sys.stderr)
+            failed = FAILED
+            continue
+        arguments = ["run", options.config, "-o", str(folder.folder), "--rows-only"]
+        if options.resume or folder.holds_rows:
+            arguments.append("--resume")
+        arguments += ["--json"] * options.json + ["--confirm"] * options.confirm
+        selectors = [selection.selector_of(info) for info in infos]
+        if options.work_group is not None:
+            arguments += ["--work-group", str(options.work_group)]
+        for flag, values in (("-d", selectors), ("-a", options.axis), ("-R", [options.include])):
+            arguments += [word for value in values if value is not None for word in (flag, value)]
+        arguments += ["-E", options.exclude] * (options.exclude is not None)
+        arguments += [word for one in options.trackers for word in ("--trackers", str(one))]
+        if not options.json:
+            print(f"{driver.name}: {driver.title}")
+        code = drivers.in_process_of(driver, arguments).returncode
+        if code == INTERRUPTED:
+            raise KeyboardInterrupt
+        if code == USAGE:
+            return USAGE
+        if code != 0:
+            print(f"freepath: {drivers.how_it_ended(driver, code)}", file=sys.stderr)
+            _say_what_is_missing(driver, infos, cases, folder)
+            failed = FAILED
+    return failed
+
+
+def _say_what_is_missing(
+    driver: Driver, infos: list[DeviceInfo], cases: list[Case], folder: ResultFolder
+) -> None:
+    """Which cases have no row of a driver whose process ended too early."""
+    columns = ("case_id", "device", "platform", "driver_version")
+    rows = folder.rows() if folder.holds_rows else []
+    done = {tuple(row[column] for column in columns) for row in rows}
+    for info in infos:
+        place = (info.name, info.platform, info.driver_version)
+        missing = [case.name for case in cases if (case.case_id, *place) not in done]
+        if missing:
+            names = ", ".join(missing[:NAMED]) + ", ..." * (len(missing) > NAMED)
+            told = f"{len(missing)} of {len(cases)} cases were not finished on {info.label}"
+            print(f"freepath: {driver.name}: {told}: {names}", file=sys.stderr)
+    if not infos:
+        told = f"it showed no device, so that none of {len(cases)} cases was run"
+        print(f"freepath: {driver.name}: {told}", file=sys.stderr)
+    if rows:
+        told = f"go on with the same command and -o {folder.folder} --resume"
+        print(f"freepath: {driver.name}: {told}", file=sys.stderr)
+
+
+def _show(
+    options: Namespace,
+    folder: ResultFolder,
+    cases: list[Case],
+    load: float,
+    sweep: Sweep | None = None,
+) -> int:
+    """Print what the folder holds, and what failed; returns the exit code."""
+    from freepath.results.folder import records
+    from freepath.show import table
+
+    rows = _in_order(folder.rows(), cases)
+    if options.json:
+        print(json.dumps(records(rows), indent=1))
+        return _say_failures(rows)
+    console = console_of(width=80)
+    for told in folder.read_run().get("inputs") or ():
+        console.print(told, highlight=False, markup=False, soft_wrap=True)
+    print_tables(console, rows, load, options.baseline)
+    if sweep:
+        _print_times(console, sweep)
+    if options.confirm:
+        console.print(table.confirmed(folder.confirmed()), highlight=False)
+    for written in folder.paths():
+        console.print(f"wrote {written}", highlight=False, markup=False, soft_wrap=True)
+    return _say_failures(rows)
+
+
+@contextmanager
+def _shown_progress(console: Console, *, rows: bool = True) -> Iterator[Listener]:
+    """A bar on a terminal; elsewhere a line a case, if `rows`."""
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import TimeRemainingColumn as Remaining
+
+    from freepath.measure.sweep import Listener
+
+    columns = (
+        TextColumn("{task.completed:.0f}/{task.total:.0f} cases"),
+        BarColumn(),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        Remaining(elapsed_when_finished=False),
+        TextColumn("{task.description}"),
+    )
+    with Progress(
+        *columns, console=console, transient=True, disable=not console.is_terminal
+    ) as bar:
+        task = bar.add_task("", total=0)
+
+        class Shown(Listener):
+            def row(self, row: dict[str, Any]) -> None:
+                if rows and not console.is_terminal:
+                    line = f"{row['status']:>8}  {row['case']}"
+                    console.print(line, highlight=False, markup=False, soft_wrap=True)
+
+            def progress(self, done: float, total: int, what: str) -> None:
+                bar.update(task, completed=done, total=total, description=what)
+
+        yield Shown()
+
+
+def _say_how_to_resume(sweep: Sweep) -> None:
+    done = f"interrupted with {sweep.ended} of {sweep.total} cases done"
+    path = sweep.folder.folder
+    if sweep.folder.is_open:
+        done += f"; go on with the same command and -o {path} --resume"
+    print(f"freepath: {done}", file=sys.stderr)
+
+
+def _in_order(rows: list[dict[str, str]], cases: list[Case]) -> list[dict[str, str]]:
+    """Rows in the order of the cases; further ones that a resumed folder may hold come last."""
+    order = {case.case_id: case.index for case in cases}
+    last = max(order.values()) + 1
+    return sorted(rows, key=lambda row: order.get(row["case_id"], last))
+
+
+def _say_failures(rows: list[dict[str, str]]) -> int:
+    """Say what failed, each cause once; returns the exit code."""
+    from freepath.show import table
+
+    causes: dict[tuple[str, str], list[str]] = {}
+    for row in table.failures(rows):
+        # a log is of one case; what it says may be what others say
+        cause = re.sub(r" \(build-\w+\.log\)$", "", row["reason"])
+        causes.setdefault((row["status"], cause), []).append(row["case"])
+    for (status, reason), names in causes.items():
+        several = f"{len(names)} cases, the first of them {names[0]}"
+        print(
+            f"freepath: {status}: {reason}: {several if names[1:] else names[0]}", file=sys.stderr
+        )
+    return FAILED if causes else 0
+
+
+def _print_times(console: Console, sweep: Sweep) -> None:
+    if not sweep.total:
+        console.print("nothing was left to run")
+        return
+    clock, times = sweep.clock, sweep.clock.as_dict()
+    console.print(
+        f"device time {100 * times['device_time_share']:.0f} % of {clock.outside_s:.1f} s outside "
+        f"compilation; compilation {clock.build_s:.1f} s",
+        highlight=False,
+    )
+
+
+def _show_only(options: Namespace, cases: list[Case]) -> int:
+    if options.json:
+        named = [
+            case.identity() | {"name": case.name, "skipped": case.skip_reason} for case in cases
+        ]
+        print(json.dumps(named, indent=1))
+        return 0
+    for case in cases:
+        reason = f"  (skipped: {case.skip_reason})" if case.skip_reason else ""
+        print(f"{case.index:>5}  {case.name}{reason}")
+    print(f"\n{len(cases)} cases")
+    return 0

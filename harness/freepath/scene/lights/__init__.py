@@ -1,0 +1,1 @@
+"""Lights: images of the environment, and the exact radiance that paths should return."""

@@ -1,0 +1,1 @@
+"""Volumes from files: formats and what can be wrong with them."""

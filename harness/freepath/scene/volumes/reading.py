@@ -1,0 +1,99 @@
+"""Reading densities on voxels, and refusing what is no density."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from freepath.errors import VolumeError
+from freepath.scene.volumes.npy import MOST_VOXELS, open_npy
+
+
+@dataclass(frozen=True)
+class Volume:
+    """Densities as they are in the file, [z, y, x], and where its voxels are in the world.
+
+    `to_world` (3, 4) is affine and takes voxel units, in which voxel (i, j, k) covers [i, i + 1] x
+    [j, j + 1] x [k, k + 1], to the world.
+    """
+
+    path: Path
+    densities: NDArray
+    to_world: NDArray[np.float64]
+    first: tuple[int, int, int] = (0, 0, 0)
+    """The index of the first voxel in the file's own count, [z, y, x]."""
+    told: str = ""
+    """What of which file it is."""
+
+
+def read_volume(path: Path, grid: str | None = None) -> Volume:
+    """Read a .npy, a multi-part EXR, a multi-page TIFF or a grid of an OpenVDB file.
+
+    `grid` names the grid of an OpenVDB file ('' one without a name, `density[1]` the second of that
+    name); without it, the one called `density` or the only grid of scalars. Raises VolumeError,
+    with the file in its message.
+    """
+    suffix = path.suffix.lower()
+    first, told = (0, 0, 0), ""
+    if grid is not None and suffix != ".vdb":
+        raise VolumeError(f"{path}: grid {grid!r}: only OpenVDB files have named grids")
+    if suffix == ".npy":
+        densities, to_world = open_npy(path), np.eye(3, 4)
+        if densities.ndim != 3:
+            found = f"{densities.ndim}, its shape is {densities.shape}"
+            raise VolumeError(f"{path}: expected an array of rank 3 [z, y, x], got rank {found}")
+    elif suffix == ".vdb":
+        from freepath.scene.volumes.openvdb import read_openvdb
+
+        densities, to_world, first, told = read_openvdb(path, grid)
+    else:
+        from freepath.scene.volumes.images import read_slices
+
+        densities, to_world = read_slices(path)
+    if densities.size > MOST_VOXELS:
+        raise VolumeError(f"{path}: {densities.size} voxels, expected at most {MOST_VOXELS}")
+    told = told or f"{' x '.join(map(str, densities.shape))} voxels [z, y, x] of {densities.dtype}"
+    return Volume(path, densities, to_world, first, f"{path}: {told}")
+
+
+def extinction(
+    densities: NDArray,
+    sigma_t: float,
+    name: str | Path,
+    first: tuple[int, int, int] = (0, 0, 0),
+) -> NDArray[np.float32]:
+    """Return densities [z, y, x] times sigma_t, rounded once to float32.
+
+    Raises VolumeError with the first voxel, its value and the count of each kind where densities
+    are NaN, infinite or negative, or where a product does not fit into float32. Voxels are named
+    [z, y, x], counted from `first` on.
+    """
+    result = np.empty(densities.shape, dtype=np.float32)
+    largest = float(np.finfo(np.float32).max)
+    found: dict[str, list] = {}
+    for z, plane in enumerate(densities):
+        values = np.asarray(plane, dtype=np.float64)
+        with np.errstate(over="ignore", invalid="ignore"):
+            scaled = values * sigma_t
+            result[z] = scaled
+        kinds = {
+            "NaN": np.isnan(values),
+            "infinite": np.isinf(values),
+            "negative": (values < 0.0) & (values > -np.inf),
+            f"too large for float32 once multiplied by sigma_t = {sigma_t:g}": (
+                (np.abs(scaled) > largest) & np.isfinite(values)
+            ),
+        }
+        for kind, wrong in kinds.items():
+            if wrong.any():
+                y, x = (int(i) for i in np.argwhere(wrong)[0])
+                at = [start + i for start, i in zip(first, (z, y, x), strict=True)]
+                place = f"first [z, y, x] = {at}: {values[y, x]:.6g}"
+                found.setdefault(kind, [0, place])[0] += int(wrong.sum())
+    if found:
+        parts = [f"{count} {kind} ({place})" for kind, (count, place) in found.items()]
+        raise VolumeError(f"{name}: densities that cannot be used: {', '.join(parts)}")
+    return result

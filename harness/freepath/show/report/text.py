@@ -1,0 +1,138 @@
+"""A report as Markdown, and as small tables for a terminal."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from rich.markup import escape
+from rich.table import Table
+
+from freepath.show.answers import sentence
+from freepath.show.markdown import table_of as table_lines
+from freepath.show.markdown import text_of
+from freepath.show.report.data import LADDER, Report, answered, known_to
+from freepath.show.table import FAILED, marked, seconds, short, soonest
+
+TARGETS = dict(zip(LADDER, ("to 10 %", "to 1 %", "to 0.1 %"), strict=True))
+HEADER = ("case", "device", "lookups", "time", "occ.", "rel. var.", "bias (RMS)", *TARGETS.values())
+
+
+def winners(report: Report) -> list[list[str]]:
+    """For each question and device: what is the fastest to each accuracy, and when."""
+    found: dict[tuple[str, str], list[dict[str, Any]]] = {}
+    for row in report.measured:
+        found.setdefault((row["q"], row["device"]), []).append(row)
+    lines = []
+    for (question, device), rows in found.items():
+        cells = [question, device]
+        for name in TARGETS:
+            cells.append(_winner([row for row in rows if isinstance(row[name], float)], name))
+        lines.append(cells)
+    return lines
+
+
+def _winner(reaching: list[dict[str, Any]], name: str) -> str:
+    places = soonest([(row[name], known_to(row, name)) for row in reaching])
+    if not places:
+        return "not known" if reaching else "none"
+    best, others = reaching[places[0]], len(places) - 1
+    also = f" (not significantly slower: {others} more)" if others else ""
+    return f"{_time(best, name)}, {best['method']}{also}"
+
+
+def sentences(report: Report, baseline: str = "") -> list[str]:
+    """The answer at 1 % to each question on each device."""
+    several = len(report.values("device")) > 1
+    found: dict[tuple[str, str], list[dict[str, Any]]] = {}
+    for row in report.rows:
+        found.setdefault((row["q"], row["device"]), []).append(row)
+    lines = []
+    for (question, device), rows in found.items():
+        cases = [one for one in map(answered, rows) if one]
+        failed = sum(row["status"] in FAILED for row in rows)
+        told = f"{question}, on {device}" if several else question
+        lines.append(f"{told}: {sentence(cases, 0.01, baseline, failed)}")
+    return lines
+
+
+def summary(report: Report) -> Table:
+    """The winners as a table for the terminal."""
+    several = len(report.values("device")) > 1
+    table = Table(title="fastest to an accuracy", title_justify="left", box=None)
+    table.padding = (0, 1, 0, 0)
+    table.add_column("question", overflow="fold")
+    if several:
+        table.add_column("device", overflow="fold")
+    for name in TARGETS.values():
+        table.add_column(name, overflow="fold")
+    for question, device, *times in winners(report):
+        table.add_row(*map(escape, [question, *([device] if several else []), *times]))
+    return table
+
+
+def _time(row: dict[str, Any], name: str) -> str:
+    value = math.inf if row[name] == "never" else row[name]
+    return marked(value, known_to(row, name))
+
+
+def cells(row: dict[str, Any]) -> list[str]:
+    """A case's row of the full table."""
+    if row["v"] is None:
+        return [row["method"], row["device"], *[""] * 4, row["status"], *[""] * len(TARGETS)]
+    known = row["bias"] is not None
+    bias = f"{100 * row['bias']:+.2g}±{100 * row['bias_width']:.1g}%" if known else ""
+    bias += f" ({100 * row['b']:.1g}%)" if row["b"] else ""
+    return [
+        row["method"],
+        row["device"],
+        short(row["lookups"]),
+        seconds(row["t"]),
+        f"{100 * row['occupancy']:.0f}%",
+        short(row["v"]),
+        bias,
+        *(_time(row, name) for name in TARGETS),
+    ]
+
+
+def markdown(report: Report, baseline: str = "") -> str:
+    """The whole report: answers, winners, all cases, and where it was measured."""
+    lines = ["# What accuracy costs in time", ""]
+    lines += [*(f"- {text_of(line)}" for line in sentences(report, baseline)), ""]
+    lines += table_lines(["question", "device", *TARGETS.values()], winners(report))
+    for question in report.values("q"):
+        rows = [cells(row) for row in report.rows if row["q"] == question]
+        lines += ["", f"## {text_of(question)}", ""]
+        lines += table_lines(HEADER, rows)
+    lines += ["", "## Environment", ""]
+    facts = [[key, value] for run in report.runs for key, value in environment(run)]
+    lines += table_lines(["", ""], facts)
+    return "\n".join(lines) + "\n"
+
+
+def environment(run: dict[str, Any]) -> list[tuple[str, str]]:
+    """What run.json tells of where a result was measured, as names and texts."""
+    facts = [("result", run["name"])]
+    config = run.get("config")
+    if isinstance(config, dict):
+        facts.append(("config", str(config.get("name", ""))))
+    for session in _dicts(run.get("sessions")):
+        facts += [(name, str(session[name])) for name in ("started", "ended") if name in session]
+        facts += _flat(session.get("host"))
+    for device in _dicts(run.get("devices")):
+        facts += _flat(device, "device ")
+    return facts
+
+
+def _dicts(value: Any) -> list[dict[str, Any]]:
+    return [one for one in value if isinstance(one, dict)] if isinstance(value, list) else []
+
+
+def _flat(value: Any, prefix: str = "") -> list[tuple[str, str]]:
+    """The items of a dictionary, with those of dictionaries in it in its place."""
+    if not isinstance(value, dict):
+        return []
+    found = []
+    for key, one in value.items():
+        found += _flat(one, prefix) if isinstance(one, dict) else [(f"{prefix}{key}", str(one))]
+    return found

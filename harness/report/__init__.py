@@ -1,6 +1,0 @@
-"""Reports of results: a page, pictures, Markdown and text, from CSV files and run.json alone."""
-
-from freepath.report.data import Report, load
-from freepath.report.writing import FORMATS, STANDARD_OUTPUT, made, write
-
-__all__ = ["FORMATS", "STANDARD_OUTPUT", "Report", "load", "made", "write"]

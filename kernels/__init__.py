@@ -1,1 +1,0 @@
-"""OpenCL C sources, composed at run time (see README.md beside this file)."""

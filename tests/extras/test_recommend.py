@@ -1,0 +1,164 @@
+"""`freepath recommend`: the soonest case of a volume, and what cannot be asked."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from freepath.cli import main
+from freepath.extras import recommend
+from freepath.extras.recommend import majorants_of, middle_of, surely
+from freepath.results.folder import COLUMNS
+from freepath.show.answers import Case
+
+
+@pytest.fixture
+def cloud(work):
+    """Thin at the borders, empty in a half."""
+    z, y, x = np.meshgrid(*[np.linspace(-1, 1, 16)] * 3, indexing="ij")
+    np.save(work / "cloud.npy", np.exp(-4 * (x**2 + y**2 + z**2)).astype(np.float32) * (x > 0))
+    return "cloud.npy"
+
+
+@pytest.fixture
+def call(work, capsys, selector):
+    def call(*arguments):
+        try:
+            code = main(["recommend", *arguments, "-d", selector])
+        except SystemExit as ended:
+            code = ended.code
+        captured = capsys.readouterr()
+        return code, captured.out + captured.err
+
+    return call
+
+
+def test_named_with_a_config_that_measures_it_again(call, cloud, monkeypatch):
+    few = [{"grid": {"resolution": 4}}, {"grid": {"resolution": 8}}]
+    monkeypatch.setattr(recommend, "majorants_of", lambda shape: few)
+    options = ["--sigma-t", "0.5", "--budget", "1", "-R", "^(delta|ratio)$", "-o", "out"]
+    code, text = call(cloud, "--accuracy", "5%", *options)
+    assert code == 0, text
+    # at the same majorant ratio tracking has the smaller variance, and here by far
+    (best,) = re.findall(r"fastest: (\S+)", text)
+    assert "/ratio/" in best
+    assert re.search(r"of device time per ray \(95 %: .* to .*\)", text)
+    assert re.search(r"second: \S+\n +[\d.]+ .*s, [\d.]+ times as long", text)
+    assert main(["run", "out/recommended.yaml", "-N"]) == 0
+    monkeypatch.undo()
+    again, _ = call(cloud, *options)
+    assert again == 2  # the folder is taken
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "told"),
+    [
+        (["none.npy"], 2, "none.npy: expected a volume, got no file"),
+        (["cloud.npy", "--accuracy", "much"], 2, "expected a relative error such as 1%"),
+        (["cloud.npy", "--accuracy", "0"], 2, "expected a relative error such as 1%"),
+        (["cloud.npy", "--budget", "-1"], 2, "expected a number above 0"),
+        (["cloud.npy", "-R", "("], 2, "expected a regular expression"),
+        (["cloud.npy", "-R", "none"], 5, "no tracker of transmittance matches 'none'"),
+        (["cloud.npy", "--accuracy", "nan"], 2, "expected a relative error such as 1%"),
+        (["cloud.npy", "--accuracy=-1%"], 2, "expected a relative error such as 1%"),
+        (["cloud.npy", "--budget", "0"], 2, "expected a number above 0"),
+        (["cloud.npy", "--sigma-t", "inf"], 2, "expected a number above 0"),
+        (["."], 2, ".: expected a volume, got a folder"),
+        (["empty.npy"], 2, "empty.npy: is empty: expected a density above 0"),
+        (
+            ["nan.npy"],
+            2,
+            "nan.npy: densities that cannot be used: 1 NaN (first [z, y, x] = [2, 3, 4]: nan)",
+        ),
+        (["flat.npy"], 2, "flat.npy: expected an array of rank 3"),
+        (["text.vdb"], 2, "text.vdb: is not an OpenVDB file"),
+        (["text.exr"], 2, "text.exr: is not an image"),
+        (["cloud.npy", "--grid", "density"], 2, "only OpenVDB files have named grids"),
+    ],
+)
+def test_what_cannot_be_asked(call, cloud, arguments, code, told):
+    odd = np.ones((8, 8, 8), np.float32)
+    np.save("empty.npy", 0 * odd)
+    np.save("flat.npy", odd[0])
+    odd[2, 3, 4] = np.nan
+    np.save("nan.npy", odd)
+    for name in ("text.vdb", "text.exr"):
+        Path(name).write_text("text")
+    found, text = call(*arguments)
+    assert "Traceback" not in text
+    assert (found, told in text) == (code, True), text
+
+
+def test_majorants_follow_the_voxels():
+    shapes = [((126, 86, 154), [16, 11, 20]), ((16, 16, 16), [4, 4, 4])]
+    for shape, middle in shapes:
+        found = majorants_of(shape)
+        assert found[0] == "global"
+        assert "octree" in found[-1]
+        assert found[middle_of(found)] == {"grid": {"resolution": middle}}
+    assert middle_of(majorants_of((1, 1, 1))) == 0
+
+
+def test_how_sure():
+    def taking(time, noise):
+        return Case("x", "t", "t", "none", None, time, noise, 0.0)
+
+    assert surely(taking(1, 0.1), taking(1, 0.1)) == pytest.approx(0.5)
+    # 1.96 standard errors apart
+    assert surely(taking(1, 0.1), taking(1.1, 0.0)) == pytest.approx(0.975, abs=1e-3)
+    assert surely(taking(1, 0.0), taking(1, 0.0)) == 1
+
+
+def row_of(name, time, noise="0.01", **changes):
+    row = dict.fromkeys(COLUMNS, "") | {"status": "ok", "tracker": name, "majorant": "none"}
+    row |= {"case": f"transmittance/m/{name}/auto/strict", "reference": "0.5", "estimate": "0.5"}
+    row |= {"time_per_sample_s": str(time / 1e4), "variance": "0.25", "bias_rms": "0"}
+    return row | {"time_noise": "0.01", "variance_noise": noise} | changes
+
+
+def noted(*rows):
+    """A search that has seen these rows, one after the other."""
+    search = recommend.Search(*[None] * 4, "transmittance", 0.01, 1.0, (), None)
+    for row in rows:
+        search.note(row, {"tracker": {row["tracker"]: {}}})
+    return search
+
+
+def test_what_is_not_known_pushes_nothing_out():
+    """Six cases whose intervals hold 0, and two that are known: these go on first."""
+    lucky = [row_of(f"lucky{i}", 1e-6, noise="1.5") for i in range(6)]
+    search = noted(*lucky, row_of("march", 3e-4), row_of("ratio", 2e-4))
+    assert [one.case.tracker for one in search._few(3)] == ["ratio", "march", "lucky0"]
+
+
+def test_what_went_wrong_in_a_later_round_never_competes():
+    fast = row_of("fast", 1e-5)
+    for status in ("mismatch", "invalid", "build_failed", "timeout"):
+        search = noted(fast, row_of("slow", 1e-3), fast | {"status": status})
+        assert [one.case.tracker for one in search._few(5)] == ["slow"]
+
+
+def test_the_last_word_is_of_all_rounds():
+    """What a first round knew stays known, whatever a later one makes of it or does not ask."""
+    first, later = row_of("march", 2e-7), row_of("march", 1e-3, noise="2.0")
+    search = noted(first, later, row_of("weighted", 16e-3))
+    best, other = search._few(2)
+    assert (best.case.tracker, other.case.tracker) == ("march", "weighted")
+    assert best.case.time_s == pytest.approx(2e-7, rel=0.01)
+    again = noted(first, row_of("march", 3e-7))
+    assert again._few(1)[0].case.time_s == pytest.approx(3e-7, rel=0.01)
+
+
+def test_the_compilers_error_is_told():
+    rows = [
+        row_of(name, 1, status="build_failed", reason="error: unknown target CPU 'generic'")
+        for name in "abc"
+    ]
+    told = noted()._why_none(rows, Path("out"))
+    assert told == (
+        "no case could be measured: 3 failed; build_failed: error: unknown target CPU 'generic'"
+    )
+    told = noted()._why_none([*rows[:1], row_of("march", 1, bias_rms="1")], Path("out"))
+    assert told.startswith("no case reaches a relative error of 1 %")
+    assert "1 failed; build_failed: error: unknown target" in told

@@ -1,0 +1,421 @@
+"""Reports: their numbers, their formats, and the page in a real browser."""
+
+import csv
+import itertools
+import json
+import math
+import shutil
+import time
+
+import pytest
+
+from freepath.cli import main
+from freepath.errors import FreepathError
+from freepath.results.folder import COLUMNS, CONFIRM_COLUMNS
+from freepath.show.report import load, write
+from freepath.show.report.pictures import picture
+from freepath.show.report.text import markdown, sentences
+from support.many import many
+
+EVIL = "</script><script>alert(1)</script><b>`|"
+ROW = dict.fromkeys(COLUMNS, "") | {
+    "case_id": "1",
+    "case": "transmittance/cloud-64/global/t1/delta/auto/strict",
+    "status": "ok",
+    "device": "a [b] <c>",
+    "platform": "p",
+    "driver_version": "1",
+    "estimand": "transmittance",
+    "medium": "cloud-64",
+    "majorant": "global",
+    "tightness": "1.0",
+    "tracker": "delta",
+    "tracker_label": "delta",
+    "arithmetic": "strict",
+    "lanes": "16",
+    "rays": "64",
+    "time_per_sample_s": "1e-06",
+    "lookups_per_sample": "5.0",
+    "lane_occupancy": "0.9",
+    "time_noise": "0.02",
+    "variance_noise": "0.02",
+    "estimate": "0.5",
+    "reference": "0.5",
+    "variance": "0.25",
+    "bias": "0.0",
+    "bias_stderr": "0.001",
+    "bias_rms": "0.0",
+    "time_to_10pct_s": "0.0001",
+    "time_to_1pct_s": "0.01",
+    "time_to_0.1pct_s": "inf",
+}
+
+
+def row_of(number, tracker, tightness=1.0, seconds=1e-6, **changes):
+    case = f"transmittance/cloud-64/global/t{tightness:g}/{tracker}/auto/strict"
+    row = ROW | {"case_id": str(number), "case": case, "tracker": tracker, "tracker_label": tracker}
+    row |= {"tightness": str(tightness), "time_per_sample_s": str(seconds)}
+    return row | {"time_to_1pct_s": str(1e4 * seconds)} | changes
+
+
+def result_of(folder, rows, confirmed=()):
+    folder.mkdir(exist_ok=True)
+    for name, columns, found in (
+        ("summary.csv", COLUMNS, rows),
+        ("confirm.csv", CONFIRM_COLUMNS, confirmed),
+    ):
+        if found:
+            with (folder / name).open("w", newline="") as file:
+                writer = csv.DictWriter(file, columns)
+                writer.writeheader()
+                writer.writerows(found)
+    host = {"processor": EVIL, "load_at_start": 1.5}
+    (folder / "run.json").write_text(json.dumps({"sessions": [{"host": host}]}))
+    return folder
+
+
+CONFIRMED = dict.fromkeys(CONFIRM_COLUMNS, "") | {
+    "case_id": "0",
+    "case": ROW["case"],
+    "device": "a [b] <c>",
+    "platform": "p",
+    "reference": "0.5",
+    "samples_per_ray": "10",
+    "time_s": "1e-5",
+    "rmse_predicted": "0.1",
+    "rmse_measured": "0.102",
+    "rmse_low": "0.1",
+    "rmse_high": "0.104",
+}
+
+
+@pytest.fixture
+def result(tmp_path):
+    rows = [
+        row_of(10 * i + j, tracker, tightness, 1e-6 * (1 + i + j))
+        for i, tracker in enumerate(("delta", "ratio", EVIL.replace("/", "")))
+        for j, tightness in enumerate((1.0, 2.0, 4.0))
+    ]
+    rows[-1] |= {"variance_noise": "0.5", "time_to_10pct_s": rows[-1]["time_per_sample_s"]}
+    rows.append(row_of(99, "march", status="mismatch", reason="off"))
+    other = [row | {"device": "other"} for row in rows[:3]]
+    return result_of(tmp_path / "result", rows + other, [CONFIRMED])
+
+
+def test_relative_numbers_and_times(result):
+    report = load([result])
+    first = report.rows[0]
+    assert (first["v"], first["vt"], first["vl"]) == (1.0, 1e-6, 5.0)
+    assert (first["t10"], first["t01"]) == (1e-4, "never")
+    assert first["lo"] == 1e-6
+    assert report.confirmed[0]["ratio"] == pytest.approx(1.02)
+    assert [row["v"] for row in report.rows if row["status"] == "mismatch"] == [None]
+
+
+@pytest.mark.parametrize(
+    "chart",
+    ["cost", "pareto", "tightness-time", "tightness-lookups", "lookups", "occupancy", "devices"],
+)
+def test_every_chart_is_drawn(result, tmp_path, chart):
+    for name, start in (("p.svg", b"<svg"), ("p.png", b"\x89PNG")):
+        path = tmp_path / name
+        assert main(["report", str(result), "--chart", chart, "-o", str(path)]) == 0
+        assert path.read_bytes().startswith(start)
+    assert "<script" not in (tmp_path / "p.svg").read_text()
+
+
+def drawn_lines(panel):
+    return next(layer for layer in panel["layer"] if layer["mark"]["type"] == "line")["encoding"]
+
+
+@pytest.mark.parametrize("chart", ["cost", "tightness-time", "pareto"])
+def test_devices_differ_in_their_lines(tmp_path, chart):
+    name = "pthread-a processor with a long name"
+    versions = ("3.0-rc2 of a wheel", "3.1 of a distribution")
+    rows = [
+        row_of(10 * i + j, tracker, j + 1.0, device=name, platform=platform, driver_version=version)
+        for i, (tracker, version) in enumerate(itertools.product(("delta", "ratio"), versions))
+        for j, platform in enumerate(["Portable Computing Language"] * 2)
+    ]
+    report = load([result_of(tmp_path / "two", rows)])
+    (panel,) = picture(report, chart).to_dict()["concat"]
+    dash = drawn_lines(panel)["strokeDash"]
+    assert dash["field"] == "device"
+    assert dash["scale"]["domain"] == report.values("device")
+    assert dash["scale"]["range"][0] != dash["scale"]["range"][1]
+    # cut as they are for a legend, names still differ
+    cut = json.loads(dash["legend"]["labelExpr"].removesuffix("[datum.label]").strip("()"))
+    assert list(cut) == report.values("device")
+    assert len(set(cut.values())) == 2
+    assert all(len(shown) < 50 for shown in cut.values())
+    svg = tmp_path / "p.svg"
+    write([tmp_path / "two"], svg, None, chart)
+    assert all(shown in svg.read_text() for shown in cut.values())
+    # a single device leaves the dashes to the majorants, and needs no legend
+    alone = load([result_of(tmp_path / "one", [r for r in rows if r["driver_version"][2] == "0"])])
+    (panel,) = picture(alone, chart).to_dict()["concat"]
+    assert drawn_lines(panel).get("strokeDash", {}).get("field") != "device"
+
+
+def test_lights_are_told_apart_and_shown_side_by_side(tmp_path, result):
+    places = ("point-0.5x0.5x2", "point-0.5x0.5x9")
+    rows = [
+        row_of(i, tracker, light=light, scatterings="1")
+        for i, (tracker, light) in enumerate(itertools.product(("delta", "joint"), places))
+    ]
+    lit = result_of(tmp_path / "lit", rows)
+    assert all(light in text for text, light in zip(load([lit]).values("q"), places, strict=True))
+    chart = picture(load([lit]), "lights").to_dict()
+    (panel,) = chart["concat"]
+    assert panel["encoding"]["x"]["sort"] == list(places)
+    assert len(next(iter(chart["datasets"].values()))) == 4
+    with pytest.raises(FreepathError, match="nothing that the chart 'lights'"):
+        picture(load([result]), "lights")
+
+
+def test_markdown_names_the_soonest(result):
+    text = markdown(load([result]))
+    line = next(line for line in text.splitlines() if line.startswith("| transmittance, cloud"))
+    assert "10 ms, delta, global x1" in line
+    assert "<script" not in text.replace("\\<", "")
+
+
+def test_what_is_known_roughly_is_marked_and_ties_are_counted(tmp_path):
+    """Other times of the ladder are those of a single sample, in which there is no variance."""
+    rough = {"variance_noise": "0.4", "time_to_10pct_s": "1e-06", "time_to_1pct_s": "0.0099"}
+    rows = [row_of(1, "delta", **rough), row_of(2, "ratio"), row_of(3, "split", seconds=1e-5)]
+    report = load([result_of(tmp_path / "result", rows)])
+    assert [row["rough"] for row in report.rows] == [["t1"], [], []]
+    lines = markdown(report).splitlines()
+    soonest = next(line for line in lines if line.startswith("| transmittance, cloud"))
+    assert "| ~9.9 ms, delta, global x1 (not significantly slower: 1 more) |" in soonest
+    (case,) = (line for line in lines if line.startswith("| delta"))
+    assert case.endswith("| 1 us | ~9.9 ms | never |")
+
+
+def test_what_is_not_known_is_not_the_fastest(tmp_path):
+    """An interval that holds 0, at a sixteenth of the time: the answer is what is known."""
+    rows = [
+        row_of(1, "delta"),
+        row_of(2, "ratio", seconds=1e-6 / 16, variance_noise="1.43"),
+        row_of(3, "split", seconds=5e-7),
+        row_of(4, "march", seconds=1e-9, status="mismatch", reason="off"),
+    ]
+    report = load([result_of(tmp_path / "result", rows)])
+    (line,) = sentences(report)
+    assert line == (
+        "transmittance, cloud-64, 64 rays: At 1 %: split, global, tightness 1 is 2.0 (1.9 to 2.1) "
+        "times as fast as delta, global, tightness 1; not ranked, as their variance is not "
+        "settled: 1; not ranked, as they failed: 1."
+    )
+    text = markdown(report)
+    assert text.splitlines()[2] == "- " + line
+    assert "| 5 ms, split, global x1 |" in text
+    (case,) = (one for one in text.splitlines() if one.startswith("| ratio"))
+    assert "| ?625 us |" in case
+    (only,) = sentences(load([result_of(tmp_path / "other", [rows[1], rows[3]])]))
+    assert "At 1 %: the variance of no case is settled; measure longer; not ranked" in only
+
+
+def test_the_baseline_can_be_chosen(result, capsys):
+    assert main(["report", str(result), "--baseline", "t4/delta", "--format", "md"]) == 0
+    first = capsys.readouterr().out.splitlines()[2]
+    assert "is 3.0 (2.9 to 3.1) times as fast as delta, global, tightness 4" in first
+
+
+def test_markdown_and_what_is_asked_for_is_printed(result, capfdbinary):
+    before = sorted(result.iterdir())
+    for arguments, start in (
+        (["--format", "md"], b"# What accuracy costs in time"),
+        (["-o", "-"], b"# What accuracy costs in time"),
+        (["-o", "-", "--format", "svg"], b"<svg"),
+        (["-o", "-", "--format", "html"], b"<!doctype html>"),
+    ):
+        assert main(["report", str(result), *arguments]) == 0
+        printed = capfdbinary.readouterr().out
+        assert printed.startswith(start)
+        assert b"wrote" not in printed.splitlines()[-1]
+    assert sorted(result.iterdir()) == before
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["-o", "p.pdf"], "expected a name that ends in one of .html, .md, .svg, .png"),
+        (["--format", "md", "-o", "p.svg"], "--format md does not fit p.svg"),
+        (["--chart", "pareta", "-o", "p.svg"], "did you mean 'pareto'?"),
+        (["-o", "none/p.html"], "cannot write none/p.html: No such file or directory"),
+    ],
+)
+def test_mistakes(result, monkeypatch, tmp_path, capsys, arguments, message):
+    monkeypatch.chdir(tmp_path)
+    assert main(["report", str(result), *arguments]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_nothing_to_show(tmp_path, capsys):
+    assert main(["report", str(tmp_path / "none")]) == 2
+    assert "expected the folder of a run, with summary.csv in it" in capsys.readouterr().err
+    empty = result_of(tmp_path / "empty", [ROW | {"status": "build_failed", "variance": ""}])
+    assert main(["report", str(empty)]) == 2
+    assert "no case that was measured" in capsys.readouterr().err
+
+
+@pytest.fixture(scope="module")
+def browser():
+    api = pytest.importorskip("playwright.sync_api")
+    path = shutil.which("chromium") or shutil.which("chromium-browser")
+    if not path:
+        pytest.skip("no Chromium")
+    with api.sync_playwright() as playwright:
+        found = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
+        yield found
+        found.close()
+
+
+@pytest.fixture
+def opened(browser):
+    """Open a page; everything that it asks for, and every complaint, is kept."""
+    contexts = []
+
+    def opened(path, **options):
+        context = browser.new_context(**options)
+        contexts.append(context)
+        page, complaints, asked = context.new_page(), [], []
+        page.on("console", lambda message: complaints.append(message.text))
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        page.on("dialog", lambda dialog: complaints.append("dialog"))
+        page.on("request", lambda request: asked.append(request.url))
+        page.goto(path.as_uri())
+        page.wait_for_function("typeof vegaEmbed === 'function'")
+        page.wait_for_selector("#figure-cost canvas")
+        page.evaluate("freepathReady()")
+        return page, complaints, asked
+
+    yield opened
+    for context in contexts:
+        context.close()
+
+
+def column(page, place):
+    return page.locator(f"#body tr td:nth-child({place})").all_inner_texts()
+
+
+def test_the_page(result, opened):
+    _, path = write([result], None, None)
+    page, complaints, asked = opened(path)
+    assert len(column(page, 1)) == 13
+    page.locator("#head th", has_text="time").click()
+    times = column(page, 1 + page.locator("#head th").all_inner_texts().index("time"))
+    assert times[0] == "1 us"
+    page.locator("#head th", has_text="time").click()
+    assert column(page, 1 + page.locator("#head th").all_inner_texts().index("time"))[0] == "5 us"
+    place = 1 + page.locator("#head th").all_inner_texts().index("to 1 %")
+    assert [text for text in column(page, place) if "~" in text] == ["~50 ms"]
+    page.fill("#filter", "ratio -x4")
+    page.wait_for_function("document.querySelectorAll('#body tr').length === 2")
+    assert all("ratio" in text for text in column(page, 1))
+    page.fill("#filter", "delta")
+    page.wait_for_function("document.querySelectorAll('#body tr').length === 6")
+    page.evaluate("freepathReady()")
+    page.evaluate("scrollTo(0, 0)")
+    page.wait_for_timeout(300)
+    page.evaluate("freepathReady()")
+    box = page.locator("#figure-cost canvas").bounding_box()
+    tip = page.locator("#vg-tooltip-element.visible")
+    for place in range(40):
+        down = 0.25 + 0.15 * (place % 4)
+        page.mouse.move(
+            box["x"] + (0.1 + place / 80) * box["width"], box["y"] + down * box["height"]
+        )
+        page.wait_for_timeout(60)
+        if tip.count():
+            break
+    assert "delta, global x" in tip.inner_text()
+    assert complaints == []
+    assert [url for url in asked if not url.startswith(("file:", "data:"))] == []
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_the_page_on_a_phone(result, opened, scheme):
+    _, path = write([result], None, None)
+    page, complaints, _ = opened(path, viewport={"width": 390, "height": 844}, color_scheme=scheme)
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390
+    colour = page.evaluate("getComputedStyle(document.body).backgroundColor")
+    assert (colour == "rgb(255, 255, 255)") == (scheme == "light")
+    assert complaints == []
+
+
+SLACK = 4
+"""Other work on the machine that runs the tests is forgiven."""
+FIRST = "document.querySelector('#figure-cost canvas') && document.querySelector('#body tr')"
+
+
+def test_ten_thousand_rows(work, selector, browser):
+    """Built in 5 s, open in 2 s: the first chart is drawn, and the table can be used."""
+    (work / "x.yaml").write_text(
+        "name: x\nrays: {orthographic: {resolution: [4, 4]}}\nstop: {samples: 50}\n"
+        "matrix: {medium: {homogeneous: {sigma_t: 1}}, tracker: [delta, ratio], "
+        "tightness: [1, 2]}\n"
+    )
+    assert main(["run", "x.yaml", "-o", "out", "-d", selector]) == 0
+    result = many(work / "out", work / "many")
+    write([result], None, None)  # so that the library is there
+    started = time.process_time()
+    _, path = write([result], None, None)
+    took = {"build": time.process_time() - started}
+    page = browser.new_page()
+    complaints = []
+    page.on("console", lambda message: complaints.append(message.text))
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.goto(path.as_uri(), wait_until="commit")
+    page.wait_for_function(FIRST)
+    # by the browser's clock, from the start of the navigation on
+    took["open"] = page.evaluate("performance.now()") / 1000
+
+    def timed(name, action, until):
+        before = page.evaluate("performance.now()")
+        action()
+        page.wait_for_function(until)
+        took[name] = (page.evaluate("performance.now()") - before) / 1000
+
+    header = page.locator("#head th", has_text="rel. var.")
+    timed("sort", header.click, "document.querySelector('th[aria-sort=ascending]')")
+    some = "document.querySelector('#place').textContent.endsWith('of 1')"
+    timed("filter", lambda: page.fill("#filter", "ratio-p=7, x2 homogeneous-1-3"), some)
+    page.close()
+    print(", ".join(f"{name} {seconds:.2f} s" for name, seconds in took.items()))
+    assert complaints == []
+    assert took["build"] < 5 * SLACK / 2
+    assert max(took["open"], took["sort"], took["filter"]) < 2 * SLACK
+
+
+def test_a_table_for_notebooks(result):
+    import freepath
+
+    table = freepath.load(result)
+    rows = table if isinstance(table, list) else table.to_dict("records")
+    assert len(rows) == 13
+    assert rows[0]["variance"] == 0.25
+    assert math.isinf(rows[0]["time_to_0.1pct_s"])
+    with pytest.raises(Exception, match="expected the folder of a run"):
+        freepath.load(result / "none")
+
+
+def test_a_run_from_python(work, selector):
+    import freepath
+    from freepath.errors import ConfigError
+
+    (work / "x.yaml").write_text(
+        "name: x\nrays: {orthographic: {resolution: [4, 4]}}\n"
+        "matrix: {medium: {homogeneous: {sigma_t: 1}}, tracker: delta}\nstop: {samples: 50}\n"
+    )
+    told = []
+    table = freepath.run(
+        "x.yaml", "out", devices=[selector], progress=lambda *what: told.append(what)
+    )
+    assert len(table) == 1
+    assert told
+    with pytest.raises(ConfigError, match=r"x.yaml:3"):
+        (work / "x.yaml").write_text("name: x\nrays: {orthographic: {}}\nmatrox: {}\n")
+        freepath.run("x.yaml", "out2")
