@@ -35,6 +35,7 @@ lint: $(VENV)/installed-for-tests
 schema: $(VENV)/installed
 	$(BIN)/freepath schema -o configs/schema.json
 	$(BIN)/python -m freepath.results.columns docs/notation.md
+	$(BIN)/python -c 'from freepath.show.glossary import markdown; print(end=markdown())' > docs/glossary.md
 
 # Debian's python3 has venv only with the package python3-venv, whose installation takes root;
 # virtualenv does the same from the package index.

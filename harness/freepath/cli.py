@@ -17,6 +17,7 @@ from freepath.commands import (
     check,
     compare,
     devices,
+    explain,
     listing,
     recommend,
     report,
@@ -37,6 +38,7 @@ COMMANDS = {
     "source": source,
     "schema": schema,
     "list": listing,
+    "explain": explain,
     "devices": devices,
 }
 
@@ -51,6 +53,7 @@ examples:
   freepath run my.yaml -R delta -E grid     only cases named delta, none named grid
   freepath run my.yaml -o out --resume      go on where an interrupted run stopped
   freepath list trackers                    what can be compared
+  freepath explain tightness                what a word of the table means
   freepath report out                       one HTML file of it, to look at
   freepath compare before after             what became slower, noisier or different
   freepath check -L fast -j 2               does this device compute what it should?

@@ -30,7 +30,8 @@ LEGEND = (
     "rays, which decides, where it is more. to 1%: device time per ray to a relative RMSE of 1 %; "
     "~ if it is not known to 20 %, ? if it is not known, never if the RMS of the bias is larger; "
     "* the fastest, and what is not significantly slower. lookups: ~ if counted over few samples. "
-    "Without a reference (?) the estimate stands in for it."
+    "Without a reference (?) the estimate stands in for it. Words: freepath explain WORD, "
+    "docs/glossary.md."
 )
 
 
