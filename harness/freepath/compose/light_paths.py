@@ -218,8 +218,8 @@ def of_scene(
     phase = "isotropic"
     if case.medium.g or everything:
         phase = "henyey_greenstein"
-    if case.medium.phase == "rod":
-        phase = "rod"
+    if case.medium.phase != "henyey_greenstein":  # which alone has a g
+        phase = case.medium.phase
     return Effects(
         names=names,
         channels=channels,

@@ -60,7 +60,7 @@ def _of_channel(
     if same and albedo == 1 and case.scatterings == "unlimited" and intensity == 0:
         return np.full(len(segments), radiance)
     single = same and case.scatterings == 1 and medium.kernel == "homogeneous"
-    if single and emission == 0 and radiance == 0 and case.medium.phase != "rod":
+    if single and emission == 0 and radiance == 0 and case.medium.phase == "henyey_greenstein":
         return albedo * intensity * _single_scattering(case, medium, segments)
     return None
 
