@@ -98,7 +98,7 @@ variance_noise float - half its 95 % interval over rounds, relative; empty where
 rmse float - of one sample: rmse^2 = variance + bias_rms^2
 inv_efficiency_lookups float - variance x lookups per sample: lower is better
 inv_efficiency_s float s variance x seconds per sample: lower is better
-time_to_10pct_s float s device seconds a ray until the RMSE is 10 % of the reference; `inf` where
+time_to_10pct_s float s device seconds per ray until the RMSE is 10 % of the reference; `inf` where
     the bias alone is more, empty where the variance is unknown
 time_to_1pct_s float s the same for 1 %
 time_to_0.1pct_s float s the same for 0.1 %
@@ -129,7 +129,7 @@ CONFIRM_TABLE = _listed(
     """
 samples_per_ray int - of an independent estimate
 repeats int - how many independent estimates of all rays were made
-time_s float s device seconds a ray of an estimate, at the pace that the machine had when the case
+time_s float s device seconds per ray of an estimate, at the pace that the machine had when the case
     was measured
 drift float - how much slower the machine was while confirming: the estimates take turns with
     ordinary rounds of the case, and their time is reported in units of these, the lower quartile of
