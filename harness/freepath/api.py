@@ -64,9 +64,10 @@ def run(
     """Run a config, a path or the name of one that ships, as `freepath run` does.
 
     `output` is the folder for the results (default: results/NAME-TIME), `devices` and `axes` are
-    what -d and -a take. `progress` is told how many cases are done, of how many, and what is being
-    done; True prints a line a case. Returns what `load` does. Raises FreepathError with the message
-    that the command line prints, and KeyboardInterrupt with what was measured left in the folder.
+    what -d and -a take. `progress` is called with how many cases are done, of how many, and what
+    is being done; True prints a line per case. Returns what `load` does. Raises FreepathError with
+    the message that the command line prints, and KeyboardInterrupt with what was measured left in
+    the folder.
     """
     from freepath.device import selection
     from freepath.measure.sweep import Listener

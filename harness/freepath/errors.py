@@ -1,4 +1,4 @@
-"""What a user is told when something is wrong, and the exit code that goes with it."""
+"""What a user reads when something is wrong, and the exit code that goes with it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From a config to its cases: the product of the axes, named, identified and told what to skip."""
+"""From a config to its cases: the product of the axes, with names, ids and reasons to skip."""
 
 from __future__ import annotations
 

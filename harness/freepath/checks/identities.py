@@ -18,7 +18,7 @@ from freepath.measure.stats import RARE, Moments
 Array = NDArray[np.float64]
 
 RESOLVED = 0.05  # relative standard error of a mean that says something
-EVENTS = 16  # of a ray, at least, that can tell whether samples depend on each other
+EVENTS = 16  # of a ray, at least, that can show whether samples depend on each other
 GROUPS = 8  # of rays with like expectations: errors of thin and of thick rays must not cancel
 
 
@@ -81,7 +81,7 @@ def noise_of(moments: Moments, expected: Array) -> float:
 def check_mean(moments: Moments, expected: Array, alpha: float, event: float = 0.0) -> None:
     """z-tests of the mean of each group of rays.
 
-    They must be able to tell something: weights that explode would hide behind their own variance.
+    They must be able to show something: weights that explode would hide behind their own variance.
     `event` is how much a rare one adds to a score, where that is known: see `largest_event`.
     """
     square_error = moments.variance / moments.count
@@ -143,7 +143,7 @@ def check_independence(scores: Array, alpha: float) -> None:
 
     If they had not, sums over rays would vary more or less than each ray does, and neighbouring
     samples of a ray would correlate. Every ray counts alike, or the one of the largest variance
-    might be all there is; a ray of a few high scores tells nothing, wherever they happen to be.
+    might be all there is; a ray of a few high scores shows nothing, wherever they happen to be.
     """
     deviation = scores - scores.mean(axis=1, keepdims=True)
     squares = deviation**2

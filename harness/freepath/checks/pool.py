@@ -99,7 +99,7 @@ class Pool:
     processes: int
     timeout: float
     on_start: Any
-    """Is told each task as it starts."""
+    """Called with each task as it starts."""
     _groups: deque[deque[Task]] = field(default_factory=deque, init=False)
     _workers: list[Worker] = field(default_factory=list, init=False)
 

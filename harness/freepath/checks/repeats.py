@@ -24,7 +24,7 @@ def of_devices(
     """What repeats say of each device, and whether one had too many false alarms.
 
     All repeats of one kernel come first, so none is whole where they were stopped: their p-values
-    are told then, but no rate.
+    are reported then, but no rate.
     """
     told, wrong = [], False
     for device, outcomes in by_device.items():
@@ -64,7 +64,7 @@ def false_alarms(outcomes: Sequence[Outcome], repeats: int) -> tuple[str, bool]:
 def small_p_values(outcomes: Sequence[Outcome]) -> str:
     """Whether p-values are as small as often as they say; and the checks of which they are not.
 
-    Alarms are far too rare to tell: a test with a wrong distribution shows in p-values first.
+    Alarms are far too rare to show it: a test with a wrong distribution shows in p-values first.
     """
     by_name: dict[str, list[float]] = defaultdict(list)
     for one in outcomes:

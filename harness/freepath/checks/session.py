@@ -1,4 +1,4 @@
-"""A run of checks: on each device in processes of its own, told as it goes on."""
+"""A run of checks: on each device in processes of its own, reported as it goes on."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Chosen = Sequence[tuple[int, Check]]
 
 @dataclass(frozen=True)
 class Options(Setting):
-    """How checks are run, and what is told of them."""
+    """How checks are run, and what is reported of them."""
 
     parallel: int = 1
     timeout: float = 300.0

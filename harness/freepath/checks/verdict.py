@@ -58,7 +58,7 @@ def require(
 ) -> None:
     """Fail where the smallest of several p-values is smaller than chance explains.
 
-    `measured` and `expected`, a value for each p-value where there are such, are told then.
+    `measured` and `expected`, a value for each p-value where there are such, are reported then.
     """
     p_values = np.atleast_1d(p_values)
     level, worst = sidak(alpha, len(p_values)), int(np.argmin(p_values))

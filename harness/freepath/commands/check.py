@@ -26,7 +26,7 @@ FOR_DRIVERS = (
     *("label_regex", "label_exclude", "tests_regex", "exclude_regex"),
     *("verbose", "rerun_failed", "stop_on_failure", "output_on_failure"),
 )
-"""What the process of a driver is told again, beside its devices."""
+"""What the process of a driver is given again, beside its devices."""
 
 
 def add(commands: Any) -> None:

@@ -21,8 +21,8 @@ def add(commands: Any) -> None:
         help="compare results with a reference",
         description="Compare results case by case: times by repeated rounds, variances, estimates "
         "by z, lookups exactly. Ratios are contender / reference. REFERENCE and CONTENDER are "
-        "folders of a run, or folders that hold several runs of the same sweep, which tells far "
-        "more about times.",
+        "folders of a run, or folders that hold several runs of the same sweep, which shows "
+        "far more about times.",
         epilog="exit codes: 0 no verdict of --fail-on; 1 one of them; 2 usage, or results that "
         "should not be compared",
         allow_abbrev=False,

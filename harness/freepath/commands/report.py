@@ -39,7 +39,7 @@ def add(commands: Any) -> None:
     report.add_argument(
         "--format",
         choices=("html", "md", "svg", "png"),
-        help="the format, where the name of FILE does not tell",
+        help="the format, where the name of FILE does not say",
     )
     report.add_argument(
         "--chart",

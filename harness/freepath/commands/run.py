@@ -66,7 +66,7 @@ def add(commands: Any) -> None:
         "--confirm",
         action="store_true",
         help="measure the error of each case at three more sample counts, write it beside the "
-        "prediction into confirm.csv, and tell how many predictions hold",
+        "prediction into confirm.csv, and say how many predictions hold",
     )
     run.add_argument(
         "--work-group",

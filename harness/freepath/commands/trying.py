@@ -109,7 +109,7 @@ def _check(
 
 
 def _say_verdict(console: Console, outcomes: list[Outcome], kept: Path) -> bool:
-    """Say whether it is right, and what failed; tells whether it is wrong."""
+    """Say whether it is right, and what failed; returns whether it is wrong."""
     from freepath.extras import candidate
 
     wrong = candidate.failed(outcomes)

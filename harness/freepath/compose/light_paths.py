@@ -25,7 +25,7 @@ SKY_ROWS, SKY_COLUMNS = 64, 128
 def modes_pay(medium: str, channels: int) -> bool:
     """Whether lanes on shadow rays and on paths are faster together, if they can share a lookup.
 
-    Where it is dear, in voxel grids, and holding a path is not: docs/decisions/shadow-rays.md.
+    Where it is expensive, in voxel grids, and holding a path is not: docs/decisions/shadow-rays.md.
     """
     return medium in {"grid_nearest", "grid_trilinear"} and channels == 1
 

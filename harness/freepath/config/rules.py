@@ -40,7 +40,7 @@ def _cut(text: str) -> str:
 
 
 def failure(message: str, kind: str = "expected") -> PydanticCustomError:
-    """Return the error to raise inside a validator; `kind` tells where the caret belongs."""
+    """Return the error to raise inside a validator; `kind` says where the caret belongs."""
     # the message is handed over as a value: in the template its braces would be replaced
     return PydanticCustomError(kind, "{message}", {"message": message})
 
@@ -194,7 +194,7 @@ class OneOrMore(_Wrapper):
 
 @dataclass(frozen=True)
 class Several(_Wrapper):
-    """A list of at least and at most so many values."""
+    """A list of at least and at most N values."""
 
     least: int
     most: int

@@ -98,7 +98,7 @@ class Stop(Model):
     at_most: Annotated[float, Number("time", above=0)] = 10.0
     """Seconds of measuring for one case."""
     samples: Annotated[int, Number("count", minimum=2, maximum=MOST_SAMPLES)] | None = None
-    """Exactly so many samples for each ray, instead of the rules above."""
+    """Exactly this many samples for each ray, instead of the rules above."""
     rounds: Annotated[int, Number("count", minimum=2, maximum=10_000)] = 10
     """How many rounds these samples are taken in, at least; the same layout in every run."""
 
@@ -108,7 +108,7 @@ class Stop(Model):
         stop = handler(data)
         wrong = {"rounds": "expected beside samples alone, which it divides"}
         if stop.samples is not None:
-            why = "expected without samples, of which exactly so many are taken"
+            why = "expected without samples, of which exactly N are taken"
             wrong = dict.fromkeys(PRECISELY, why)
         lines = [
             InitErrorDetails(type=failure(text, UNKNOWN_KEY), loc=(name,), input=data)

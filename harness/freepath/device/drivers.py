@@ -21,7 +21,7 @@ from pathlib import Path
 from freepath.device.icd import in_icd_files, in_package, strangers
 
 CHOSEN = "FREEPATH_DRIVER"
-"""The variable that tells a process which driver it is for."""
+"""The variable that says which driver a process is for."""
 STEERING = ("OCL_ICD_", "OPENCL_VENDOR_PATH", "RUSTICL_", "OCLGRIND_", "LD_PRELOAD")
 """Variables of the user that would bring other drivers into a process."""
 INTEL = "libintelocl.so"
@@ -222,7 +222,7 @@ def in_process_of(
 
     What it prints is passed through, or captured as stdout and stderr. An interruption of this
     process is handed on, and waits until the other has left everything in order. Raises
-    subprocess.TimeoutExpired after so many seconds.
+    subprocess.TimeoutExpired after that many seconds.
     """
     command = [*driver.prefix, sys.executable, "-m", module, *arguments]
     streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE} if capture else {}
@@ -254,7 +254,7 @@ def in_process_of(
 
 
 def how_it_ended(driver: Driver, code: int) -> str:
-    """What to tell of a driver's process that failed; a crash of the driver ends it by a signal."""
+    """What to say of a driver's process that failed; a crash of the driver ends it by a signal."""
     if code >= 0:
         return f"{driver.name}: its process ended with exit code {code}"
     try:

@@ -14,7 +14,7 @@ KNOWN = ("libpocl", "libintelocl", "fpga_emu", "libRusticlOpenCL")
 LIBRARIES = tuple(
     map(Path, ("/usr/lib/x86_64-linux-gnu", "/usr/lib64", "/usr/lib", "/usr/local/lib"))
 )
-"""Where a library that an .icd file names without a path is looked for, to tell its version."""
+"""Where a library that an .icd file names without a path is looked for, to know its version."""
 
 
 def icd_files() -> dict[Path, str]:

@@ -65,7 +65,7 @@ def samples_of(samples: int | None, info: DeviceInfo) -> int | None:
 
 
 def parts_of(samples: int, info: DeviceInfo) -> int:
-    """Into how many units to cut so many samples of a ray: 1 where nothing limits loops."""
+    """Into how many units to cut N samples of a ray: 1 where nothing limits loops."""
     if not info.loop_limit:
         return 1
     least = -(-samples // SAMPLES_OF_A_UNIT)

@@ -42,7 +42,7 @@ class DeviceInfo:
     """What a device says of itself."""
 
     name: str
-    """Several alike on one platform are told apart by a number."""
+    """Several alike on one platform are distinguished by a number."""
     platform: str
     driver_version: str
     kind: str
@@ -66,7 +66,7 @@ class DeviceInfo:
 
     @property
     def timing_source(self) -> str:
-        """`device` where events tell the time, `wall` where the driver says that they do not."""
+        """`device` where events report the time, `wall` where the driver says that they do not."""
         return "device" if self.timer_resolution_s > 0.0 else "wall"
 
 
@@ -203,7 +203,7 @@ class Device:
             return cl.Buffer(self.context, flags, hostbuf=array)
 
     def allocate(self, size: int) -> cl.Buffer:
-        """Make a buffer of so many bytes."""
+        """Make a buffer of N bytes."""
         with run_errors(self.info.label, f"allocating {size} bytes"):
             return cl.Buffer(self.context, cl.mem_flags.READ_WRITE, size)
 
@@ -283,7 +283,7 @@ class Program:
 
     @property
     def binary_bytes(self) -> int | None:
-        """Size of what the driver compiled; None where it does not tell."""
+        """Size of what the driver compiled; None where it does not say."""
         try:
             return sum(self._kernel.program.binary_sizes) or None
         except (cl.Error, AttributeError):

@@ -113,7 +113,7 @@ def _unknown(selector: str, tried: dict[Driver, Outcome]) -> str:
 
 
 def checked(parts: Parts) -> Parts:
-    """The same; raises DeviceError where two drivers' devices cannot be told apart.
+    """The same; raises DeviceError where two drivers' devices cannot be distinguished.
 
     Rows are known by name and platform, and those of one would take the place of the other's.
     """
@@ -124,8 +124,8 @@ def checked(parts: Parts) -> Parts:
             if other is not driver:
                 raise DeviceError(
                     f"{other.name} and {driver.name} differ by the driver's version alone, and a "
-                    f"result tells devices apart by name and platform: {known.label}, {info.label}"
-                    "; run each into a folder of its own"
+                    "result distinguishes devices by name and platform: "
+                    f"{known.label}, {info.label}; run each into a folder of its own"
                 )
     return parts
 

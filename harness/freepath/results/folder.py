@@ -70,7 +70,7 @@ class ResultFolder:
         """Make the folder, or take it over: rows that stand stay, rows to be made anew go.
 
         `planned` holds at least the KEY columns of every row that is wanted; returns the keys of
-        those that are there already. Rows of other cases and devices are left alone. `whole` tells
+        those that are there already. Rows of other cases and devices are left alone. `whole` says
         whether all files of a row are there; without them it does not stand.
         """
         wanted, places = {key_of(row) for row in planned}, {_of(row, PLACE) for row in planned}

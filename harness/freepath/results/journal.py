@@ -15,9 +15,9 @@ TWICE = 2
 
 
 class Journal:
-    """The file of a folder that names the case at work; one that is left tells of a process's end.
+    """The file of a folder that names the case at work; one that is left shows a process's end.
 
-    Cases are told by the texts of a key.
+    Cases are known by the texts of a key.
     """
 
     def __init__(self, folder: Path):

@@ -135,7 +135,7 @@ def _number(name: str, text: str) -> str:
 
 
 def agree(summary: Path, cases: Iterable[Row], rounds: Iterable[Row], key: tuple[str, ...]) -> None:
-    """Raise FreepathError where rounds do not reach what a summary tells of them.
+    """Raise FreepathError where rounds do not reach what a summary says of them.
 
     `key` are the columns that a round and its case have in common.
     """

@@ -1,4 +1,4 @@
-"""Arrays that are dear to compute, kept in the user's cache folder between runs."""
+"""Arrays that are expensive to compute, kept in the user's cache folder between runs."""
 
 from __future__ import annotations
 

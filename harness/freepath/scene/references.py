@@ -13,7 +13,7 @@ from freepath.scene.special import NODES, WEIGHTS
 
 VERSION = 1  # of the formulas below: a higher one makes cached references worthless
 DEEPEST = 100.0  # exp(-100) = 4e-44: what lies beyond this depth does not change a sum
-ROUNDS = 60  # halvings of a piece; it is then shorter than float64 tells apart
+ROUNDS = 60  # halvings of a piece; it is then shorter than float64 distinguishes
 
 
 def reference(estimand: str, medium: Medium, segments: Array) -> Array:

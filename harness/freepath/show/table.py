@@ -137,7 +137,7 @@ def _time_to_1pct(row: Row) -> tuple[float, float]:
 
 
 def best_of(rows: Iterable[Row]) -> list[Row]:
-    """The rows of a group that reach 1 % soonest, and those not significantly later."""
+    """The rows of a group that reach 1 % first, and those not significantly later."""
     finite = [r for r in rows if r["status"] == "ok" and r["time_to_1pct_s"] not in ("", "inf")]
     places = soonest([_time_to_1pct(row) for row in finite])
     return [finite[place] for place in sorted(places)]
@@ -260,9 +260,9 @@ def _rank(row: Row) -> tuple[int, float]:
 def table_of(
     rows: list[Row], ratio: Callable[[Row], str] | None = None, width: int = NARROW
 ) -> Table:
-    """A table of one group's rows, the fastest first; what reaches 1 % soonest has a star.
+    """A table of one group's rows, the fastest first; what reaches 1 % first has a star.
 
-    `ratio` tells how many times as fast as the baseline a row is. Lanes are a column where they
+    `ratio` says how many times as fast as the baseline a row is. Lanes are a column where they
     differ, else in the title.
     """
     first = rows[0]

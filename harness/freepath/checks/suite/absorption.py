@@ -64,7 +64,7 @@ def rod(
 
 
 def variance(rig: Rig, alpha: float, tracker: str, chance: float | str) -> None:
-    """A mean does not tell how often paths are absorbed: the second moment of a weight is what
+    """A mean does not show how often paths are absorbed: the second moment of a weight is what
     another rod gives, whose albedo is albedo^2 / (1 - P_absorb)."""
     # Of paths that bring their weight where they leave.
     # at 0.9 fourth powers of weights grow too fast for a test of a variance

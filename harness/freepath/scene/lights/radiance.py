@@ -105,7 +105,7 @@ def _single_scattering(case: Any, medium: Medium, segments: Array) -> Array:
 
 @functools.cache
 def _rule() -> tuple[Array, Array]:
-    """The Gauss-Legendre rule, which is dearer to set up than to use."""
+    """The Gauss-Legendre rule, which is more expensive to set up than to use."""
     return np.polynomial.legendre.leggauss(POINTS)
 
 

@@ -64,7 +64,7 @@ class Sky:
 
 
 def read_sky(light: Any, channels: int, search_path: Iterable[str | Path] = ()) -> Sky:
-    """Read the image of a light and resample it for a medium of so many channels.
+    """Read the image of a light and resample it for a medium of N channels.
 
     Of the channels of an EXR file's first part count R, G, B (or Y) of the first layer, else all of
     that layer but alpha; the picture is that of the display window. A grey medium gets the mean
@@ -90,7 +90,7 @@ def read_sky(light: Any, channels: int, search_path: Iterable[str | Path] = ()) 
 
 
 def _read(path: Path) -> tuple[Array, str]:
-    """Read the first part of an image file, [rows, columns, channels], and tell what of it."""
+    """Read the first part of an image file, [rows, columns, channels], and say what of it."""
     oiio = imported("OpenImageIO", str(path))
 
     with opened(path) as image:

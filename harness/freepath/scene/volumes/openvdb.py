@@ -40,7 +40,7 @@ def read_openvdb(
 ) -> tuple[NDArray, NDArray[np.float64], tuple[int, int, int], str]:
     """Return the densities of a grid's active box, voxels to world (3, 4), first index, and what.
 
-    Densities and index are [z, y, x]; the text tells grid, type, box, background, and what the
+    Densities and index are [z, y, x]; the text names grid, type, box, background, and what the
     library warned of. By OpenVDB's own module or an OpenImageIO that reads OpenVDB, of this Python
     or the system's, in a process with limits of memory and time. Raises VolumeError where nothing
     reads the file, or where it or the grid cannot be used.

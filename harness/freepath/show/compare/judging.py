@@ -65,7 +65,7 @@ class Judged:
     seen_from: float | None = None
     """Where times are undecided: the least ratio of them that would have been seen (95 %)."""
     runs: int | None = None
-    """And how many runs a side would show `Settings.to_show`; None where no number would."""
+    """And how many runs per side would show `Settings.to_show`; None where no number would."""
     why: str = ""
 
     @property

@@ -1,6 +1,6 @@
 """Variances of few runs, steadied by those of their neighbours.
 
-Three runs a side tell the variance of a case's change badly, but cases of a scene vary much alike
+Three runs per side show the variance of a case's change badly, but cases of a scene vary much alike
 from run to run. Smyth 2004 (Linear models and empirical Bayes methods for assessing differential
 expression) takes the true variances for draws from a scaled inverse chi-square, whose two
 parameters the spread of the estimates tells: where they differ by no more than chance, all share

@@ -78,7 +78,7 @@ def undecided(judged: Sequence[Judged], to_show: float) -> str:
     text += " would have been seen (95 %); "
     if None in runs:
         return text + f"no number of runs would show {wanted}: measure on a quieter machine"
-    return text + f"{max(runs)} runs a side would show {wanted}"
+    return text + f"{max(runs)} runs per side would show {wanted}"
 
 
 def totals(judged: Sequence[Judged]) -> str:

@@ -4,7 +4,7 @@ Rounds of a scene's cases take turns, a round of each in a pass, so a drift of t
 cases of a pass alike. log(time) = case + pass + noise is fitted robustly, as Tukey's median polish
 does but by lower quartiles: what disturbs a round makes it longer, often twice as long, and never
 shorter. What is compared between two runs is the case's part. How far the level of all cases has
-moved together is told apart: within what a machine may drift it is no case's fault.
+moved together is separated: within what a machine may drift it is no case's fault.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ class Change:
         return max(power, abs(self.log_ratio) + self.width)
 
     def runs_to_show(self, change: float, level: float, runs: int) -> int | None:
-        """How many runs a side find a change (beyond a limit, logs) in 95 % of comparisons.
+        """How many runs per side find a change (beyond a limit, logs) in 95 % of comparisons.
 
         From the error that so many `runs` have; None where MOST_RUNS would not do.
         """
