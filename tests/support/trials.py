@@ -77,7 +77,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Print the rates; returns the exit code."""
     parser = argparse.ArgumentParser(prog="trials.py")
     parser.add_argument("reruns", type=Path, help="a folder with a folder for each rerun")
-    parser.add_argument("--runs", type=int, nargs="+", default=[1], help="runs a side")
+    parser.add_argument("--runs", type=int, nargs="+", default=[1], help="runs per side")
     parser.add_argument("--tries", type=int, default=1000, help="A/A comparisons")
     parser.add_argument("--planted", type=int, default=200, help="tries with a planted change")
     options = parser.parse_args(arguments)
@@ -86,7 +86,7 @@ def main(arguments: list[str] | None = None) -> int:
     print(f"{len(runs)} reruns, {len(runs[0].rows)} cases, {rounds:.0f} rounds a case")
     for k in options.runs:
         if 2 * k > len(runs):
-            print(f"{k} runs a side take {2 * k} reruns", file=sys.stderr)
+            print(f"{k} runs per side take {2 * k} reruns", file=sys.stderr)
             return 2
         for what, tries, plant in (
             ("false alarms", options.tries, None),
@@ -94,7 +94,7 @@ def main(arguments: list[str] | None = None) -> int:
             ("1 % biased, found", options.planted, biased),
         ):
             found, low, high = rate(copy.copy(runs), k, tries, settings, plant)
-            print(f"{k} runs a side: {what} {found} of {tries} ({low:.1%} to {high:.1%})")
+            print(f"{k} runs per side: {what} {found} of {tries} ({low:.1%} to {high:.1%})")
     return 0
 
 
