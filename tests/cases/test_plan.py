@@ -340,6 +340,7 @@ def test_ids_are_the_same_in_another_process(expand, tmp_path):
     )
     (tmp_path / "only").mkdir()
     text = "/*---\ntitle: x\nestimands: transmittance\nneeds: majorant\n---*/\n"
+    text += "static void at_tentative(Path *path) {}\n"
     (tmp_path / "only" / "delta.cl").write_text(text)
     run = [sys.executable, "-c", code, str(tmp_path / "only")]
     result = subprocess.run(run, capture_output=True, text=True, check=True, cwd=tmp_path)
