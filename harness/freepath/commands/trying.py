@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time
 from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import shtab
 
 from freepath.commands.arguments import add_device, positive
-from freepath.errors import FAILED
+from freepath.errors import FAILED, INTERRUPTED
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -46,6 +47,12 @@ def add(commands: Any) -> None:
         metavar="X",
         help="extinction where the volume's density is 1 (default: 1)",
     )
+    trying.add_argument(
+        "--like",
+        default="",
+        metavar="NAME",
+        help="what to compare it with (default: `like:` of its front matter, or the nearest)",
+    )
     add_device(trying, "part of the name, platform or driver of the device")
     trying.add_argument(
         "-o",
@@ -64,36 +71,21 @@ def add(commands: Any) -> None:
 
 def execute(options: Namespace) -> int:
     """Run it; returns the exit code."""
-    from freepath.commands.common import console_of, volume_of
+    from freepath.commands.common import console_of, own_folder, volume_of
     from freepath.device.selection import one_device
     from freepath.extras import candidate
-    from freepath.results.folder import ResultFolder, new_folder
+    from freepath.results.folder import new_folder
 
-    known, tracker = candidate.read(options.tracker)
+    known, tracker, parent = candidate.read(options.tracker, options.like)
     volume = volume_of(options.volume, options.sigma_t) if options.volume else None
     path = options.output or new_folder(f"try-{tracker.name}")
-    ResultFolder(path)  # refuses one that holds a run
     device = one_device(options.device)
     console = console_of()
     console.print(f"{tracker.title}, on {device.info.label}", highlight=False, markup=False)
+    started = time.monotonic()
     candidate.build(device, known, tracker)
-    outcomes = _check(options, console, known, tracker, device)
-    path.mkdir(parents=True, exist_ok=True)
-    wrong = _say_verdict(console, outcomes, candidate.keep(outcomes, path))
-    if wrong or options.checks_only:
-        return FAILED if wrong else 0
-    config = path / candidate.CONFIG
-    config.write_text(
-        candidate.sweep_text(tracker, candidate.relatives(known, tracker), volume), "utf-8"
-    )
-    return _measure(console, config, (known, tracker), device)
-
-
-def _check(
-    options: Namespace, console: Console, known: Catalog, tracker: Tracker, device: Device
-) -> list[Outcome]:
-    from freepath.extras import candidate
-
+    compiling_s = time.monotonic() - started
+    own_folder(path, "try")
     chosen = candidate.checks_of(known, tracker, every=options.every_check)
     which = "all" if options.every_check else "fast"
     console.print(
@@ -105,15 +97,32 @@ def _check(
         def tell(line: str) -> None:
             status.update(line.strip())
 
-        return candidate.check(chosen, options.tracker, device.info, processes, tell)
+        outcomes, stopped = candidate.check(
+            chosen, options.tracker, device.info, processes, tell, compiling_s
+        )
+    wrong = _say_verdict(console, outcomes, candidate.keep(outcomes, path), stopped)
+    if stopped == candidate.INTERRUPTED:
+        return INTERRUPTED
+    if wrong or options.checks_only:
+        return FAILED if wrong else 0
+    config = path / candidate.CONFIG
+    others = {one.name: one for one in (parent, *candidate.relatives(known, tracker))}
+    few = list(others.values())[: candidate.RELATIVES]
+    config.write_text(candidate.sweep_text(tracker, few, volume), "utf-8")
+    return _measure(console, config, (known, tracker, parent), device)
 
 
-def _say_verdict(console: Console, outcomes: list[Outcome], kept: Path) -> bool:
+def _say_verdict(console: Console, outcomes: list[Outcome], kept: Path, stopped: str) -> bool:
     """Say whether it is right, and what failed; tells whether it is wrong."""
     from freepath.extras import candidate
 
     wrong = candidate.failed(outcomes)
     told = {"highlight": False, "markup": False, "soft_wrap": True}
+    if stopped:
+        console.print(f"{stopped}; {len(outcomes)} checks were run", **told)
+    if not wrong and stopped:
+        console.print(f"none of them failed; wrote {kept}", **told)
+        return stopped != candidate.INTERRUPTED
     if not wrong:
         skipped = len(outcomes) - candidate.passed(outcomes)
         beside = f", {skipped} do not apply" if skipped else ""
@@ -130,7 +139,7 @@ def _say_verdict(console: Console, outcomes: list[Outcome], kept: Path) -> bool:
 def _measure(
     console: Console,
     config: Path,
-    trackers: tuple[Catalog, Tracker],
+    trackers: tuple[Catalog, Tracker, Tracker],
     device: Device,
 ) -> int:
     """Measure it beside its relatives, write the report and say where it pays."""
@@ -140,18 +149,23 @@ def _measure(
     from freepath.show import report, table
     from freepath.show.report.text import sentences, summary
 
-    known, tracker = trackers
+    known, tracker, parent = trackers
     with _shown_progress(console) as listener:
         sweep = api.sweep(config, config.parent, known=known, devices=[device], listener=listener)
-        sweep.run()
+        try:
+            sweep.run()
+        except KeyboardInterrupt:
+            where = f"its folder is {config.parent}, which `freepath report` shows"
+            console.print(f"interrupted with {sweep.ended} of {sweep.total} cases; {where}")
+            return INTERRUPTED
     folder = sweep.folder
     found, page = report.write([folder.folder], None, "html")
     console.print("", summary(found), "")
     told = {"highlight": False, "markup": False, "soft_wrap": True}
     for line in sentences(found):
         console.print(line, **told)
-    for standing in candidate.standings(found, tracker):
-        console.print(f"{standing.question}:\n  {standing}", **told)
+    for line in candidate.beside_parent(folder.rows(), tracker.name, parent.name):
+        console.print(line, **told)
     console.print(f"wrote {page}", **told)
     failures = [row for row in table.failures(folder.rows()) if row["tracker"] == tracker.name]
     for row in failures:
