@@ -16,11 +16,11 @@ BUDGET = {
     "show": 2900,
     "measure": 2400,
     "config": 2100,
-    "commands": 1650,
+    "commands": 1662,
     "device": 1400,
     "compose": 1000,
     "results": 750,
-    "extras": 860,
+    "extras": 838,
     "modules on the first floor": 450,
     "cases": 300,
 }

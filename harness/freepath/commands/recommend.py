@@ -12,6 +12,8 @@ import shtab
 from freepath.commands.arguments import (
     add_baseline,
     add_device,
+    add_output,
+    add_sigma_t,
     add_trackers,
     expression,
     number_or_percent,
@@ -22,6 +24,9 @@ from freepath.errors import INTERRUPTED
 if TYPE_CHECKING:
     from freepath.extras.recommend import Finding, Search
     from freepath.extras.renderers import Renderer
+
+
+DEFAULT = "sigma_t is the default, 1: another may have another fastest; give yours by --sigma-t"
 
 
 def add(commands: Any) -> None:
@@ -57,12 +62,6 @@ def add(commands: Any) -> None:
         choices=("mitsuba", "pbrt", "cycles"),
         help="recommend what this renderer has, with its settings, and what the rest would gain",
     )
-    recommend.add_argument(
-        "--sigma-t",
-        type=positive,
-        metavar="X",
-        help="extinction where the volume's density is 1 (default: 1)",
-    )
     recommend.add_argument("--grid", metavar="NAME", help="which grid of an OpenVDB file")
     recommend.add_argument(
         "--budget",
@@ -71,13 +70,8 @@ def add(commands: Any) -> None:
         metavar="SECONDS",
         help="of measuring, in all; compilation comes on top (default: 30)",
     )
-    recommend.add_argument(
-        "-o",
-        "--output",
-        type=Path,
-        metavar="DIR",
-        help="folder for results and config (default: results/recommend-NAME-TIME)",
-    ).complete = shtab.DIRECTORY
+    add_sigma_t(recommend)
+    add_output(recommend, "results and config", "recommend-NAME")
     recommend.add_argument(
         "-R",
         "--include",
@@ -122,7 +116,7 @@ def execute(options: Namespace) -> int:
     console = console_of()
 
     def say(*lines: str) -> None:
-        for line in lines:
+        for line in filter(None, lines):
             console.print(line, highlight=False, markup=False, soft_wrap=True)
 
     asked = (medium, options.estimand, options.accuracy, options.budget)
@@ -137,16 +131,12 @@ def execute(options: Namespace) -> int:
         finally:
             search.keep()
     say(
-        *[interrupted] * bool(interrupted),
+        interrupted,
         f"{options.volume.name}, {options.estimand} to {100 * options.accuracy:g} %, on "
         f"{device.info.label}",
         search.dense,
+        DEFAULT if options.sigma_t is None else "",
     )
-    if options.sigma_t is None:
-        say(
-            "sigma_t is the default, 1: at another density another case may be the fastest; give "
-            "your scene's by --sigma-t"
-        )
     try:
         finalists = search.finalists()
     except RunError as error:
@@ -155,18 +145,13 @@ def execute(options: Namespace) -> int:
         say(str(error))
         return INTERRUPTED
     mine = [one.case for one in search.found.values() if search.is_had(one)]
-    say(
-        *told_of(finalists, search.side), answers.sentence(mine, options.accuracy, options.baseline)
-    )
-    if renderer:
-        say(*_told_for(renderer, finalists[0], search))
-    say(*[search.edge] * bool(search.edge))
+    say(*told_of(finalists, search.side))
+    say(answers.sentence(mine, options.accuracy, options.baseline))
+    say(*(_told_for(renderer, finalists[0], search) if renderer else ()), search.edge)
     if search.lacks or search.spent_s > OVER * options.budget:
         lacks = "; ".join(search.lacks) or "no case can be given less than 0.05 s"
-        say(
-            f"the budget of {options.budget:g} s was too little: {search.spent_s:.1f} s were "
-            f"taken; not measured: {lacks}"
-        )
+        took = f"{search.spent_s:.1f} s were taken; not measured: {lacks}"
+        say(f"the budget of {options.budget:g} s was too little: {took}")
     say(
         f"{search.measured} cases measured in {clock.outside_s:.0f} s, and {clock.build_s:.0f} s "
         f"of compilation",
@@ -177,7 +162,7 @@ def execute(options: Namespace) -> int:
 
 def told_of(finalists: list[Finding], side: float) -> list[str]:
     """The best, how sure that is, and what the others take; a voxel's side is in the world."""
-    from freepath.extras.recommend import surely
+    from freepath.show import answers
     from freepath.show.table import seconds
 
     best, *others = (one.case for one in finalists)
@@ -191,9 +176,9 @@ def told_of(finalists: list[Finding], side: float) -> list[str]:
         lines.append(f"  its step: {step / side:.3g} x a voxel, {step:.4g} in units of the scene")
     for place, one in enumerate(others):
         what = "second" if place == 0 else "then"
-        line = f"{seconds(one.time_s)}, {one.time_s / best.time_s:.2f} times as long; "
-        sure = f"that it is slower is {100 * surely(best, one):.0f} % sure"
-        lines += [f"{what}: {one.case}", f"  {line}{sure if one.settled else 'not known'}"]
+        middle, low, high = map(answers.digits, answers.ratio(one, best))
+        times = f"{middle} ({low} to {high}) times as long" if one.settled else "not known"
+        lines += [f"{what}: {one.case}", f"  {seconds(one.time_s)}, {times}"]
     return lines
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import shtab
 
-from freepath.commands.arguments import add_device, positive
+from freepath.commands.arguments import add_device, add_output, add_sigma_t
 from freepath.errors import FAILED, INTERRUPTED
 
 if TYPE_CHECKING:
@@ -40,13 +40,7 @@ def add(commands: Any) -> None:
         metavar="FILE",
         help="measure it on this volume too: .vdb, .exr, .tif or .npy",
     ).complete = shtab.FILE
-    trying.add_argument(
-        "--sigma-t",
-        type=positive,
-        default=1.0,
-        metavar="X",
-        help="extinction where the volume's density is 1 (default: 1)",
-    )
+    add_sigma_t(trying)
     trying.add_argument(
         "--like",
         default="",
@@ -54,13 +48,7 @@ def add(commands: Any) -> None:
         help="what to compare it with (default: `like:` of its front matter, or the nearest)",
     )
     add_device(trying, "part of the name, platform or driver of the device")
-    trying.add_argument(
-        "-o",
-        "--output",
-        type=Path,
-        metavar="DIR",
-        help="folder for checks, results and report (default: results/try-NAME-TIME)",
-    ).complete = shtab.DIRECTORY
+    add_output(trying, "checks, results and report", "try-NAME")
     trying.add_argument(
         "--every-check", action="store_true", help="the slow checks too, which take minutes"
     )
@@ -77,7 +65,7 @@ def execute(options: Namespace) -> int:
     from freepath.results.folder import new_folder
 
     known, tracker, parent = candidate.read(options.tracker, options.like)
-    volume = volume_of(options.volume, options.sigma_t) if options.volume else None
+    volume = volume_of(options.volume, options.sigma_t or 1.0) if options.volume else None
     path = options.output or new_folder(f"try-{tracker.name}")
     device = one_device(options.device)
     console = console_of()
@@ -93,12 +81,8 @@ def execute(options: Namespace) -> int:
     )
     processes = min(2, os.cpu_count() or 1)
     with console.status("checking") as status:
-
-        def tell(line: str) -> None:
-            status.update(line.strip())
-
         outcomes, stopped = candidate.check(
-            chosen, options.tracker, device.info, processes, tell, compiling_s
+            chosen, options.tracker, device.info, processes, status.update, compiling_s
         )
     wrong = _say_verdict(console, outcomes, candidate.keep(outcomes, path), stopped)
     if stopped == candidate.INTERRUPTED:
@@ -114,19 +98,18 @@ def execute(options: Namespace) -> int:
 
 def _say_verdict(console: Console, outcomes: list[Outcome], kept: Path, stopped: str) -> bool:
     """Say whether it is right, and what failed; tells whether it is wrong."""
-    from freepath.extras import candidate
+    from freepath.checks.outcome import SKIPPED
 
-    wrong = candidate.failed(outcomes)
+    wrong = [one for one in outcomes if one.wrong]
+    right = sum(not one.wrong and one.status != SKIPPED for one in outcomes)
     told = {"highlight": False, "markup": False, "soft_wrap": True}
     if stopped:
         console.print(f"{stopped}; {len(outcomes)} checks were run", **told)
-    if not wrong and stopped:
-        console.print(f"none of them failed; wrote {kept}", **told)
-        return stopped != candidate.INTERRUPTED
     if not wrong:
-        skipped = len(outcomes) - candidate.passed(outcomes)
+        skipped = len(outcomes) - right
         beside = f", {skipped} do not apply" if skipped else ""
-        console.print(f"right: {candidate.passed(outcomes)} checks passed{beside}", **told)
+        verdict = "none failed so far" if stopped else "right"
+        console.print(f"{verdict}: {right} checks passed{beside}", **told)
         return False
     console.print(f"wrong: {len(wrong)} of {len(outcomes)} checks failed", **told)
     for one in wrong:
@@ -136,12 +119,10 @@ def _say_verdict(console: Console, outcomes: list[Outcome], kept: Path, stopped:
     return True
 
 
-def _measure(
-    console: Console,
-    config: Path,
-    trackers: tuple[Catalog, Tracker, Tracker],
-    device: Device,
-) -> int:
+Trackers = tuple["Catalog", "Tracker", "Tracker"]
+
+
+def _measure(console: Console, config: Path, trackers: Trackers, device: Device) -> int:
     """Measure it beside its relatives, write the report and say where it pays."""
     from freepath import api
     from freepath.commands.run import _shown_progress

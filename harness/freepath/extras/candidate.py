@@ -12,7 +12,7 @@ from typing import Any
 from freepath.checks import registry
 from freepath.checks import session as checking
 from freepath.checks.model import Check
-from freepath.checks.outcome import CRASHED, SKIPPED, TIMEOUT, Outcome
+from freepath.checks.outcome import CRASHED, TIMEOUT, Outcome
 from freepath.checks.rig import Rig
 from freepath.checks.suite.common import everyone, homogeneous
 from freepath.checks.verdict import NotApplicable
@@ -60,9 +60,8 @@ def read(file: Path, like: str = "") -> tuple[Catalog, Tracker, Tracker]:
             f"{file}:1:1: estimands: expected transmittance or free_path among them, for these "
             f"have checks, got {', '.join(tracker.estimands)}"
         )
-    nearest = relatives(known, tracker)
-    parent = like or tracker.like or nearest[0].name
-    fits = [other.name for other in relatives(known, tracker, every=True)]
+    fits = [other.name for other in relatives(known, tracker)]
+    parent = like or tracker.like or fits[0]
     if parent not in fits:
         raise CatalogError(f"{file}: like: expected one of {', '.join(fits)}, got {parent}")
     return known, tracker, known.trackers[parent]
@@ -105,7 +104,7 @@ def check(
     left = [one for one in chosen if one not in smoke]
     slow = TIMEOUT_S if all("fast" in one.labels for _, one in chosen) else 5 * TIMEOUT_S
     ended: list[Outcome] = []
-    parts = [(smoke, SMOKE_S + 10 * compiling_s), (left, slow)]
+    parts = [(smoke, round(SMOKE_S + 4 * compiling_s)), (left, slow)]
     for part, timeout in (one for one in parts if one[0]):
         options = checking.Options(parallel=processes, trackers=(file,), timeout=timeout)
         session = checking.Session(part, options, tell)
@@ -128,15 +127,14 @@ def keep(outcomes: Sequence[Outcome], folder: Path) -> Path:
     return path
 
 
-def relatives(known: Catalog, tracker: Tracker, *, every: bool = False) -> list[Tracker]:
-    """The trackers most like it: that share estimands, and what they need and promise."""
+def relatives(known: Catalog, tracker: Tracker) -> list[Tracker]:
+    """Those that share an estimand, by how much alike they are in what they need and promise."""
     others = [
         other
         for other in known.trackers.values()
         if other.name != tracker.name and set(other.estimands) & set(tracker.estimands)
     ]
-    others.sort(key=lambda other: (-_likeness(tracker, other), len(other.name)))
-    return others if every else others[:RELATIVES]
+    return sorted(others, key=lambda other: (-_likeness(tracker, other), len(other.name)))
 
 
 def _likeness(one: Tracker, other: Tracker) -> float:
@@ -181,16 +179,6 @@ def sweep_text(tracker: Tracker, others: Sequence[Tracker], volume: dict[str, An
     return "\n".join(lines) + "\n"
 
 
-def failed(outcomes: Sequence[Outcome]) -> list[Outcome]:
-    """The checks that it did not pass."""
-    return [one for one in outcomes if one.wrong]
-
-
-def passed(outcomes: Sequence[Outcome]) -> int:
-    """How many it passed."""
-    return sum(not one.wrong and one.status != SKIPPED for one in outcomes)
-
-
 def beside_parent(rows: Sequence[Row], name: str, parent: str) -> list[str]:
     """How many times as fast a tracker is as its parent to 1 %, at each majorant and tightness."""
     lines = []
@@ -214,8 +202,7 @@ def beside_parent(rows: Sequence[Row], name: str, parent: str) -> list[str]:
 
 def _in_words(own: answers.Case | None, other: answers.Case | None) -> str:
     if own is None or other is None:
-        known = {(True, True): "neither reaches", (True, False): "it never reaches"}
-        return f"{known.get((own is None, other is None), 'only it reaches')} 1 %"
+        return "it never reaches 1 %" if own is None else "only it reaches 1 %"
     if not (own.settled and other.settled):
         return "not known: the variance of its scores is not settled"
     low, high = answers.ratio(other, own)[1:]

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy import stats
 
 from freepath import api
 from freepath.cases import plan
@@ -123,7 +122,7 @@ class Search:
         if self.renderer:
             tracker = "ratio" if self.estimand == "transmittance" else "delta"
             finest = majorants[-1]["octree"]["resolution"]
-            self.had = self.renderer.has(tracker, finest, self.side)
+            self.had = self.renderer.points(tracker, finest, self.side)
         points = [
             {"tracker": tracker, "majorant": majorants[middle_of(majorants)], "tightness": 1}
             for tracker in self.trackers(self.side)
@@ -148,17 +147,13 @@ class Search:
     def finalists(self) -> list[Finding]:
         """The best that is known of what is had, the fastest first; raises RunError if none is."""
         mine = sorted(filter(self.is_had, self.found.values()), key=lambda one: one.rank)
-        if not mine:
+        if not mine or not mine[0].case.settled:
             what = f"that {self.renderer.title} has " if self.renderer else ""
-            raise RunError(
-                f"nothing {what}is known to reach a relative error of "
-                f"{100 * self.accuracy:g} %; what was measured is in {self.folder}"
-            )
-        if not mine[0].case.settled:
-            raise RunError(
-                "the fastest is not known: of no case is the variance settled; give it more time "
-                f"by --budget; what was measured is in {self.folder}"
-            )
+            why = f"nothing {what}is known to reach {100 * self.accuracy:g} %"
+            if mine:
+                why = "the fastest is not known: of no case is the variance settled; give it more "
+                why += "time by --budget"
+            raise RunError(f"{why}; what was measured is in {self.folder}")
         return mine[:FINALISTS]
 
     def _beyond(self, majorants: Sequence[Any]) -> None:
@@ -411,11 +406,3 @@ def axes_of(case: plan.Case) -> Axes:
     tightness = 1 if case.tightness is None else case.tightness
     tracker = {case.tracker: dict(case.params)}
     return {"tracker": tracker, "majorant": majorant, "tightness": tightness}
-
-
-def surely(first: answers.Case, second: answers.Case) -> float:
-    """The chance that the first is the faster one, errors of both taken as normal."""
-    spread = math.hypot(first.time_s * first.noise, second.time_s * second.noise) / 1.96
-    if not spread:
-        return 1.0
-    return float(stats.norm.cdf((second.time_s - first.time_s) / spread))

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 Axes = dict[str, Any]
+TIGHT: Axes = {"tightness": 1}
 RATES = (0.5, 1, 2, 4)
 """Steps of marching in voxels, where a renderer has a step."""
 
@@ -22,10 +23,6 @@ class Renderer:
     settings: Callable[[Axes, float], str]
     """What to change there for one of its points."""
     source: str
-
-    def has(self, tracker: str, finest: int, side: float) -> list[Axes]:
-        """Its points, as a config has them."""
-        return [{"tightness": 1} | point for point in self.points(tracker, finest, side)]
 
 
 def contains(axes: Any, point: Any) -> bool:
@@ -64,17 +61,19 @@ def _of_cycles(point: Axes, side: float) -> str:
 
 
 def _cycles_points(tracker: str, finest: int, side: float) -> list[Axes]:
-    marches: Sequence[Axes] = [
-        {"tracker": {"march": {"step": rate * side, "placement": "jittered"}}} for rate in RATES
+    jittered = {"placement": "jittered"}
+    marches = [
+        TIGHT | {"majorant": "global", "tracker": {"march": jittered | {"step": rate * side}}}
+        for rate in RATES
     ]
     unbiased = {"tracker": {tracker: {}}, "majorant": {"octree": {"resolution": finest}}}
-    return [*({"majorant": "global"} | one for one in marches), unbiased]
+    return [*marches, TIGHT | unbiased]
 
 
 RENDERERS = {
     "mitsuba": Renderer(
         "Mitsuba 3",
-        lambda tracker, finest, side: [{"tracker": {tracker: {}}, "majorant": "global"}],
+        lambda tracker, finest, side: [TIGHT | {"tracker": {tracker: {}}, "majorant": "global"}],
         lambda point, side: (
             "medium `heterogeneous`, integrator `volpath`: nothing to change; its "
             "one majorant is the largest extinction, which no documented parameter refines"
@@ -84,7 +83,7 @@ RENDERERS = {
     "pbrt": Renderer(
         "pbrt-v4",
         lambda tracker, finest, side: [
-            {"tracker": {tracker: {}}, "majorant": _grid(cells)} for cells in (16, 64)
+            TIGHT | {"tracker": {tracker: {}}, "majorant": _grid(cells)} for cells in (16, 64)
         ],
         _of_pbrt,
         "pbrt.org/fileformat-v4 (Media), and the two grids in src/pbrt/media",
