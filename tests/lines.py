@@ -16,11 +16,11 @@ BUDGET = {
     "show": 2925,
     "measure": 2400,
     "config": 2100,
-    "commands": 1560,
+    "commands": 1700,
     "device": 1400,
     "compose": 1000,
     "results": 750,
-    "extras": 600,
+    "extras": 838,
     "modules on the first floor": 450,
     "cases": 300,
 }

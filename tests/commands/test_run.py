@@ -354,3 +354,22 @@ def test_two_runs_in_a_second_have_two_folders(work, monkeypatch):
         names.append(folder.name)
     assert names == ["small-20200101-000000", "small-20200101-000000-2", "small-20200101-000000-3"]
     assert results.newest_folder("small").name == names[-1]
+
+
+def test_repeated_into_folders_that_compare_takes(go, capsys):
+    assert go("--repeat", "2")[0] == 0
+    assert sorted(path.name for path in Path("out").iterdir()) == ["small-1", "small-2"]
+    first, second = rows("out/small-1"), rows("out/small-2")
+    assert {row["run_id"] for row in first.values()} != {row["run_id"] for row in second.values()}
+    assert {case: row["estimate"] for case, row in first.items()} == {
+        case: row["estimate"] for case, row in second.items()
+    }
+    assert cli.main(["compare", "out", "out", "--json"]) in (0, 1)
+    assert go("--repeat", "2")[0] == 2  # they are there
+    assert go("--repeat", "3", "--resume")[0] == 0
+    assert rows("out/small-2") == second
+    assert len(rows("out/small-3")) == len(first)
+    for wrong in (("--repeat", "0"), ("--repeat", "2", "--json")):
+        code, printed = go(*wrong)
+        assert code == 2
+        assert "--repeat: expected 1 or more" in printed.err

@@ -6,11 +6,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from freepath import config
+from freepath.cases import plan
 from freepath.cli import main
+from freepath.commands.common import MARK, own_folder, volume_of
+from freepath.compose import catalog
+from freepath.errors import UsageError
 from freepath.extras import recommend
-from freepath.extras.recommend import majorants_of, middle_of, surely
+from freepath.extras.recommend import majorants_of, middle_of
+from freepath.extras.renderers import RENDERERS
 from freepath.results.folder import COLUMNS
-from freepath.show.answers import Case
 
 
 @pytest.fixture
@@ -37,24 +42,29 @@ def call(work, capsys, selector):
 def test_named_with_a_config_that_measures_it_again(call, cloud, monkeypatch):
     few = [{"grid": {"resolution": 4}}, {"grid": {"resolution": 8}}]
     monkeypatch.setattr(recommend, "majorants_of", lambda shape: few)
-    options = ["--sigma-t", "0.5", "--budget", "1", "-R", "^(delta|ratio)$", "-o", "out"]
+    Path(cloud).rename("~ein Wölkchen \U0001f600.npy")
+    cloud = "./~ein Wölkchen \U0001f600.npy"
+    options = ["--sigma-t", "0.5", "--budget", "1", "-R", "^(delta|ratio)$", "-o=-2024"]
     code, text = call(cloud, "--accuracy", "5%", *options)
     assert code == 0, text
-    # at the same majorant ratio tracking has the smaller variance, and here by far
     (best,) = re.findall(r"fastest: (\S+)", text)
-    assert "/ratio/" in best
+    assert re.search("/(ratio|delta)/", best)
     assert re.search(r"of device time per ray \(95 %: .* to .*\)", text)
-    assert re.search(r"second: \S+\n +[\d.]+ .*s, [\d.]+ times as long", text)
-    assert main(["run", "out/recommended.yaml", "-N"]) == 0
-    monkeypatch.undo()
-    again, _ = call(cloud, *options)
-    assert again == 2  # the folder is taken
+    assert re.search(r"second: \S+\n +[\d.]+ .*s, [\d.]+ \([\d.]+ to [\d.]+\) times as long", text)
+    left, told = re.search(r"too little: ([\d.]+) s were", text), "not measured: "
+    assert left is None or told in text
+    assert "optical depth along 1024 rays: mean " in text
+    assert "sigma_t is the default" not in text
+    assert main(["run", "./-2024/recommended.yaml", "-N"]) == 0
+    assert main(["report", "./-2024"]) == 0
+    again, text = call(cloud, "--accuracy", "5%", *options)
+    assert again == 0, text  # its own folder is made anew
 
 
 @pytest.mark.parametrize(
     ("arguments", "code", "told"),
     [
-        (["none.npy"], 2, "none.npy: expected a volume, got no file"),
+        (["none.npy"], 2, "none.npy: no such file in"),
         (["cloud.npy", "--accuracy", "much"], 2, "expected a relative error such as 1%"),
         (["cloud.npy", "--accuracy", "0"], 2, "expected a relative error such as 1%"),
         (["cloud.npy", "--budget", "-1"], 2, "expected a number above 0"),
@@ -64,7 +74,7 @@ def test_named_with_a_config_that_measures_it_again(call, cloud, monkeypatch):
         (["cloud.npy", "--accuracy=-1%"], 2, "expected a relative error such as 1%"),
         (["cloud.npy", "--budget", "0"], 2, "expected a number above 0"),
         (["cloud.npy", "--sigma-t", "inf"], 2, "expected a number above 0"),
-        (["."], 2, ".: expected a volume, got a folder"),
+        (["."], 2, "is a folder, expected a file"),
         (["empty.npy"], 2, "empty.npy: is empty: expected a density above 0"),
         (
             ["nan.npy"],
@@ -98,16 +108,6 @@ def test_majorants_follow_the_voxels():
         assert "octree" in found[-1]
         assert found[middle_of(found)] == {"grid": {"resolution": middle}}
     assert middle_of(majorants_of((1, 1, 1))) == 0
-
-
-def test_how_sure():
-    def taking(time, noise):
-        return Case("x", "t", "t", "none", None, time, noise, 0.0)
-
-    assert surely(taking(1, 0.1), taking(1, 0.1)) == pytest.approx(0.5)
-    # 1.96 standard errors apart
-    assert surely(taking(1, 0.1), taking(1.1, 0.0)) == pytest.approx(0.975, abs=1e-3)
-    assert surely(taking(1, 0.0), taking(1, 0.0)) == 1
 
 
 def row_of(name, time, noise="0.01", **changes):
@@ -162,3 +162,126 @@ def test_the_compilers_error_is_told():
     told = noted()._why_none([*rows[:1], row_of("march", 1, bias_rms="1")], Path("out"))
     assert told.startswith("no case reaches a relative error of 1 %")
     assert "1 failed; build_failed: error: unknown target" in told
+
+
+NAMES = (
+    "my cloud",
+    "wölkchen \U0001f600",
+    "2024",
+    "1e3",
+    "true",
+    "null",
+    "-dash",
+    "a: b",
+    "x#y",
+    "'\"",
+)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_names_of_files_and_folders_are_no_names_of_configs(name, work):
+    known = catalog.load()
+    medium = {"volume": {"file": str(work / f"{name}.npy"), "sigma_t": 1}}
+    search = recommend.Search(known, None, work / name, medium, "transmittance", 0.01, 1, (), None)
+    search.folder.mkdir()
+    text = search.config_text([{"tracker": {"delta": {}}}], {"samples": 4})
+    (search.folder / "round-1.yaml").write_text(text, "utf-8")
+    loaded = config.load(str(search.folder / "round-1.yaml"), known.parameter_models(), ())
+    (found,) = loaded.matrix.medium
+    assert str(found.file) == medium["volume"]["file"]
+
+
+def test_a_volume_is_found_where_run_finds_it(work, monkeypatch):
+    (work / "far").mkdir()
+    np.save(work / "far" / "away.npy", np.ones((4, 4, 4), np.float32))
+    monkeypatch.setenv("FREEPATH_VOLUMES", str(work / "far"))
+    assert volume_of(Path("away.npy"), 1.0)["file"] == str(work / "far" / "away.npy")
+
+
+def test_only_a_folder_of_its_own_is_emptied(work):
+    others = work / "others"
+    others.mkdir()
+    (others / "notes.txt").write_text("mine")
+    own_folder(work / "own", "recommend")
+    for folder, command in ((others, "recommend"), (work / "own", "try")):
+        with pytest.raises(UsageError, match="expected a folder that is empty, not there yet, or"):
+            own_folder(folder, command)
+    (work / "own" / "round-1").symlink_to(others)
+    own_folder(work / "own", "recommend")
+    assert [one.name for one in (work / "own").iterdir()] == [MARK]
+    assert (others / "notes.txt").read_text() == "mine"
+
+
+def test_what_is_known_is_told_when_it_is_interrupted(call, cloud, monkeypatch):
+    def interrupted(search):
+        search.side = 2.0
+        search.note(
+            row_of("march", 1e-6, tracker_label="march-step=3", tightness="", bias_rms="0.001"),
+            {"tracker": {"march": {"step": 3.0}}, "majorant": "global", "tightness": 1},
+        )
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(recommend.Search, "run", interrupted)
+    code, text = call(cloud)
+    assert code == 130
+    for told in (
+        "interrupted; what is known so far:",
+        "fastest: transmittance/m/march/auto/strict",
+        "its step: 1.5 x a voxel, 3 in units of the scene",
+        "sigma_t is the default, 1:",
+    ):
+        assert told in text
+
+
+def test_a_budget_that_is_used_up_says_what_is_missing():
+    search = noted(row_of("march", 1e-6))
+    search.spent_s = 2.0
+    assert search._round(1, [{}] * 7) == 0
+    assert search.lacks == ["majorants: 7 of 7 cases"]
+
+
+def edge_of(axes, renderer=None):
+    search = recommend.Search(catalog.load(), *[None] * 3, "transmittance", 0.01, 1, (), None)
+    search.side, search.renderer = 0.5, renderer
+    return search._further(axes, majorants_of((32, 32, 32)))
+
+
+def test_what_lies_at_the_edge_of_the_search():
+    tree = {"octree": {"resolution": 8, "slack": 0.25}}
+    inside = {"tracker": {"ratio": {}}, "majorant": "global", "tightness": 1}
+    assert edge_of(inside) == {}
+    found = edge_of(inside | {"majorant": {"grid": {"resolution": [8, 8, 8]}}, "tightness": 2.5})
+    assert list(found) == ["the finest grid", "the largest tightness"]
+    assert found["the finest grid"]["majorant"] == {"grid": {"resolution": [16, 16, 16]}}
+    assert list(edge_of(inside | {"majorant": tree})) == ["the finest octree"]
+    march = inside | {"tracker": {"march": {"step": 0.5, "placement": "midpoint"}}}
+    (told,) = edge_of(march).items()
+    assert told[0] == "the smallest step"
+    assert told[1]["tracker"] == {"march": {"step": 0.25, "placement": "midpoint"}}
+    assert edge_of(march, RENDERERS["cycles"]) == {}
+
+
+@pytest.mark.parametrize(("name", "count"), [("mitsuba", 1), ("pbrt", 2), ("cycles", 5)])
+def test_a_renderer_is_offered_what_it_has(name, count, work):
+    known, renderer = catalog.load(), RENDERERS[name]
+    medium = {"volume": {"file": "c.npy", "sigma_t": 1}}
+    search = recommend.Search(known, None, work, medium, "transmittance", 0.01, 1, (), None)
+    search.renderer, search.had = renderer, renderer.points("ratio", 8, 0.5)
+    (work / "r.yaml").write_text(search.config_text(search.had, {"samples": 4}))
+    loaded = config.load("r.yaml", known.parameter_models(), ())
+    cases = plan.expand(loaded, known)
+    assert len(cases) == count
+    for case in cases:
+        axes = recommend.axes_of(case)
+        assert search.is_had(recommend.Finding(None, axes))
+        assert renderer.settings(axes, 0.5)
+        axes["tracker"] = {"weighted_delta": {}}
+        assert not search.is_had(recommend.Finding(None, axes))
+
+
+def test_settings_follow_the_point():
+    step = {"tracker": {"march": {"step": 1.0}}}
+    assert "Step Rate Render 2 " in RENDERERS["cycles"].settings(step, 0.5)
+    for cells, kind in ((16, "uniformgrid"), (64, "nanovdb")):
+        point = {"majorant": {"grid": {"resolution": [cells] * 3}}}
+        assert f'"{kind}"' in RENDERERS["pbrt"].settings(point, 0.5)

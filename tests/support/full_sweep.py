@@ -9,6 +9,7 @@ import argparse
 import math
 from pathlib import Path
 
+from freepath import api
 from freepath.commands.common import volume_of
 from freepath.commands.recommend import told_of
 from freepath.compose import catalog
@@ -20,6 +21,7 @@ from freepath.show.table import seconds
 
 def search_of(options: argparse.Namespace) -> recommend.Search:
     """The search that `freepath recommend` makes."""
+    options.output.mkdir(parents=True, exist_ok=True)
     return recommend.Search(
         catalog.load(),
         one_device([options.device] if options.device else []),
@@ -49,7 +51,12 @@ def full_sweep(search: recommend.Search, at_most_s: float) -> dict[str, tuple[fl
     stop = recommend.PRECISION[-1] | {"at_most": f"{at_most_s:g} s"}
     path = search.folder / "full.yaml"
     path.write_text(search.config_text(every(search), stop), "utf-8")
-    rows = search.measure(path).folder.rows()
+    devices = [search.device]
+    clock = search.clock
+    name = path.with_suffix("")
+    sweep = api.sweep(path, name, known=search.known, devices=devices, clock=clock)
+    sweep.run()
+    rows = sweep.folder.rows()
     never = math.inf, 0.0
     return {r["case"]: recommend.needed(r, search.accuracy) or never for r in rows}
 

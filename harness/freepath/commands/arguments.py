@@ -42,6 +42,19 @@ def add_device(command: Any, what: str) -> None:
     )
 
 
+def add_output(command: Any, what: str, name: str) -> None:
+    """-o, the folder."""
+    told = f"folder for {what} (default: results/{name}-TIME)"
+    action = command.add_argument("-o", "--output", type=Path, metavar="DIR", help=told)
+    action.complete = shtab.DIRECTORY
+
+
+def add_sigma_t(command: Any) -> None:
+    """--sigma-t; None where it is not given, which stands for 1."""
+    told = "extinction where the volume's density is 1 (default: 1)"
+    command.add_argument("--sigma-t", type=positive, metavar="X", help=told)
+
+
 def add_trackers(command: Any) -> None:
     """--trackers, folders with further ones."""
     command.add_argument(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import sys
 from argparse import Namespace
 from pathlib import Path
@@ -31,17 +32,42 @@ def cases_of(options: Namespace) -> tuple[Config, Catalog, list[Case]]:
 
 
 def volume_of(file: Path, sigma_t: float, grid: str | None = None) -> dict[str, Any]:
-    """A volume of the command line as a config names it; raises VolumeError where it is none."""
+    """A volume of the command line as a config names it, found where `run` finds those of a config.
+
+    Raises VolumeError where it is none.
+    """
     from freepath.errors import VolumeError
+    from freepath.scene.volumes.files import find_file
     from freepath.scene.volumes.reading import read_volume
 
-    if not file.is_file():
-        what = "a folder" if file.is_dir() else "no file"
-        raise VolumeError(f"{file}: expected a volume, got {what}")
+    file = find_file(file.absolute() if os.path.lexists(file) else file)
+    if not str(file).isprintable():
+        raise VolumeError(f"{ascii(str(file))}: expected a name of characters that can be printed")
     if not read_volume(file, grid).densities.any():
         raise VolumeError(f"{file}: is empty: expected a density above 0 in a voxel at least")
     named = {} if grid is None else {"grid": grid}
     return {"file": str(file.resolve()), "sigma_t": sigma_t, **named}
+
+
+MARK = ".freepath-made"
+
+
+def own_folder(folder: Path, command: str) -> None:
+    """Make a folder, or empty one that the same command made; raises UsageError for any other."""
+    from freepath.errors import UsageError
+
+    mark = folder / MARK
+    try:
+        held = sorted(folder.iterdir()) if folder.exists() else []
+        if held and not (mark.is_file() and mark.read_text("utf-8") == command):
+            what = f"or made by `freepath {command}`"
+            raise UsageError(f"{folder}: expected a folder that is empty, not there yet, {what}")
+        for one in held:
+            shutil.rmtree(one) if one.is_dir() and not one.is_symlink() else one.unlink()
+        folder.mkdir(parents=True, exist_ok=True)
+        mark.write_text(command, "utf-8")
+    except OSError as error:
+        raise UsageError(f"{folder}: cannot be a folder for results: {error.strerror}") from error
 
 
 def print_records(records: list[dict[str, Any]], *, as_json: bool) -> int:

@@ -12,14 +12,21 @@ import shtab
 from freepath.commands.arguments import (
     add_baseline,
     add_device,
+    add_output,
+    add_sigma_t,
     add_trackers,
     expression,
     number_or_percent,
     positive,
 )
+from freepath.errors import INTERRUPTED
 
 if TYPE_CHECKING:
-    from freepath.show.answers import Case
+    from freepath.extras.recommend import Finding, Search
+    from freepath.extras.renderers import Renderer
+
+
+DEFAULT = "sigma_t is the default, 1: another may have another fastest; give yours by --sigma-t"
 
 
 def add(commands: Any) -> None:
@@ -43,14 +50,17 @@ def add(commands: Any) -> None:
         help="relative RMSE to be reached, e.g. 1%% or 0.01 (default: 1%%)",
     )
     recommend.add_argument(
-        "--estimand", choices=("transmittance", "free_path"), default="transmittance"
+        "--estimand",
+        choices=("transmittance", "free_path"),
+        default="transmittance",
+        help="transmittance: shadow rays, how much light comes through; free_path: paths, where "
+        "they collide next (default: transmittance)",
     )
     recommend.add_argument(
-        "--sigma-t",
-        type=positive,
-        default=1.0,
-        metavar="X",
-        help="extinction where the volume's density is 1 (default: 1)",
+        "--for",
+        dest="renderer",
+        choices=("mitsuba", "pbrt", "cycles"),
+        help="recommend what this renderer has, with its settings, and what the rest would gain",
     )
     recommend.add_argument("--grid", metavar="NAME", help="which grid of an OpenVDB file")
     recommend.add_argument(
@@ -60,13 +70,8 @@ def add(commands: Any) -> None:
         metavar="SECONDS",
         help="of measuring, in all; compilation comes on top (default: 30)",
     )
-    recommend.add_argument(
-        "-o",
-        "--output",
-        type=Path,
-        metavar="DIR",
-        help="folder for results and config (default: results/recommend-NAME-TIME)",
-    ).complete = shtab.DIRECTORY
+    add_sigma_t(recommend)
+    add_output(recommend, "results and config", "recommend-NAME")
     recommend.add_argument(
         "-R",
         "--include",
@@ -91,73 +96,104 @@ def _accuracy(text: str) -> float:
 
 def execute(options: Namespace) -> int:
     """Run it; returns the exit code."""
-    from freepath.commands.common import console_of, volume_of
+    from freepath.commands.common import console_of, own_folder, volume_of
     from freepath.commands.run import _shown_progress
     from freepath.compose import catalog
     from freepath.device.selection import one_device
-    from freepath.errors import UsageError
-    from freepath.extras import recommend
+    from freepath.errors import RunError
+    from freepath.extras.recommend import OVER, Search
+    from freepath.extras.renderers import RENDERERS
     from freepath.measure.sweep import Clock
     from freepath.results.folder import new_folder
     from freepath.show import answers
 
     clock = Clock()
-    medium = {"volume": volume_of(options.volume, options.sigma_t, options.grid)}
+    medium = {"volume": volume_of(options.volume, options.sigma_t or 1.0, options.grid)}
     known = catalog.load(options.trackers)
-    folder = options.output or new_folder(f"recommend-{options.volume.stem}")
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise UsageError(f"{folder}: expected a folder that is empty or not there yet")
     device = one_device(options.device)
+    folder = options.output or new_folder(f"recommend-{options.volume.stem[:60]}")
+    own_folder(folder, "recommend")
     console = console_of()
-    told = {"highlight": False, "markup": False, "soft_wrap": True}
+
+    def say(*lines: str) -> None:
+        for line in filter(None, lines):
+            console.print(line, highlight=False, markup=False, soft_wrap=True)
+
+    asked = (medium, options.estimand, options.accuracy, options.budget)
+    interrupted = ""
     with _shown_progress(console, rows=False) as listener:
-        search = recommend.Search(
-            known,
-            device,
-            folder,
-            medium,
-            options.estimand,
-            options.accuracy,
-            options.budget,
-            listener,
-            clock,
-            options.include,
-        )
-        finalists = search.run()
-    console.print(
+        renderer = RENDERERS.get(options.renderer)
+        search = Search(known, device, folder, *asked, listener, clock, options.include, renderer)
+        try:
+            search.run()
+        except KeyboardInterrupt:
+            interrupted = "interrupted; what is known so far:"
+        finally:
+            search.keep()
+    say(
+        interrupted,
         f"{options.volume.name}, {options.estimand} to {100 * options.accuracy:g} %, on "
         f"{device.info.label}",
-        **told,
+        search.dense,
+        DEFAULT if options.sigma_t is None else "",
     )
-    cases = [one.case for one in search.found.values()]
-    for line in [
-        *told_of([one.case for one in finalists]),
-        answers.sentence(cases, options.accuracy, options.baseline),
-    ]:
-        console.print(line, **told)
-    console.print(
+    try:
+        finalists = search.finalists()
+    except RunError as error:
+        if not interrupted:
+            raise
+        say(str(error))
+        return INTERRUPTED
+    mine = [one.case for one in search.found.values() if search.is_had(one)]
+    say(*told_of(finalists, search.side))
+    say(answers.sentence(mine, options.accuracy, options.baseline))
+    say(*(_told_for(renderer, finalists[0], search) if renderer else ()), search.edge)
+    if search.lacks or search.spent_s > OVER * options.budget:
+        lacks = "; ".join(search.lacks) or "no case can be given less than 0.05 s"
+        took = f"{search.spent_s:.1f} s were taken; not measured: {lacks}"
+        say(f"the budget of {options.budget:g} s was too little: {took}")
+    say(
         f"{search.measured} cases measured in {clock.outside_s:.0f} s, and {clock.build_s:.0f} s "
-        f"of compilation\nwrote {search.write(finalists)}",
-        **told,
+        f"of compilation",
+        f"wrote {search.write(finalists)}; to look at all of it: freepath report {folder}",
     )
-    return 0
+    return INTERRUPTED if interrupted else 0
 
 
-def told_of(finalists: list[Case]) -> list[str]:
-    """The best, how sure that is, and what the others take."""
-    from freepath.extras.recommend import surely
+def told_of(finalists: list[Finding], side: float) -> list[str]:
+    """The best, how sure that is, and what the others take; a voxel's side is in the world."""
+    from freepath.show import answers
     from freepath.show.table import seconds
 
-    best, *others = finalists
+    best, *others = (one.case for one in finalists)
     low, high = (best.time_s * max(0.0, 1 + sign * best.noise) for sign in (-1, 1))
     lines = [
         f"fastest: {best.case}",
         f"  {seconds(best.time_s)} of device time per ray "
         f"(95 %: {seconds(low)} to {seconds(high)})",
     ]
+    if step := next(iter(finalists[0].axes["tracker"].values())).get("step"):
+        lines.append(f"  its step: {step / side:.3g} x a voxel, {step:.4g} in units of the scene")
     for place, one in enumerate(others):
         what = "second" if place == 0 else "then"
-        line = f"{seconds(one.time_s)}, {one.time_s / best.time_s:.2f} times as long; "
-        sure = f"that it is slower is {100 * surely(best, one):.0f} % sure"
-        lines += [f"{what}: {one.case}", f"  {line}{sure if one.settled else 'not known'}"]
+        middle, low, high = map(answers.digits, answers.ratio(one, best))
+        times = f"{middle} ({low} to {high}) times as long" if one.settled else "not known"
+        lines += [f"{what}: {one.case}", f"  {seconds(one.time_s)}, {times}"]
     return lines
+
+
+def _told_for(renderer: Renderer, best: Finding, search: Search) -> list[str]:
+    """What to set in a renderer, how biased that is, and what it costs not to have the rest."""
+    from freepath.show import answers
+
+    bias = f"it is biased by {100 * best.case.bias:.1g} %"
+    known = [one.case for one in search.found.values() if one.case.settled]
+    fastest = min(known, key=lambda one: one.time_s)
+    gain = "nothing that was measured is faster"
+    if fastest is not best.case:
+        gain = f"{fastest.name} would be {answers.times_as_fast(best.case, fastest)}"
+    return [
+        f"in {renderer.title}: {renderer.settings(best.axes, search.side)}",
+        f"  {bias if best.case.biased else 'it has no measurable bias'}; of what it lacks: {gain}",
+        f"  settings from {renderer.source}",
+    ]

@@ -10,12 +10,9 @@ import time
 from argparse import Namespace
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import shtab
-
-from freepath.commands.arguments import add_baseline, add_config, add_device
+from freepath.commands.arguments import add_baseline, add_config, add_device, add_output
 from freepath.commands.common import cases_of, console_of, print_tables
 from freepath.errors import FAILED, INTERRUPTED, USAGE, UsageError
 
@@ -49,13 +46,7 @@ def add(commands: Any) -> None:
         "behind -d, or 'all'; may be repeated",
     )
     run.add_argument("-N", "--show-only", action="store_true", help="list the cases and stop")
-    run.add_argument(
-        "-o",
-        "--output",
-        type=Path,
-        metavar="DIR",
-        help="folder for the results (default: results/NAME-TIME)",
-    ).complete = shtab.DIRECTORY
+    add_output(run, "the results", "NAME")
     run.add_argument(
         "--resume",
         action="store_true",
@@ -75,6 +66,8 @@ def add(commands: Any) -> None:
         help="run kernels in work-groups of N work-items (default: 1 on CPUs, and elsewhere the "
         "fastest of a short calibration)",
     )
+    told = "run all N times, into DIR/NAME-1 to DIR/NAME-N: DIR is a side for `freepath compare`"
+    run.add_argument("--repeat", type=int, default=1, metavar="N", help=told)
     run.add_argument("--json", action="store_true", help="print the rows as JSON, nothing else")
     add_baseline(run)
     # given to the process of a driver: who started it shows the rows of all
@@ -94,6 +87,8 @@ def execute(options: Namespace) -> int:
     from freepath.measure.sweep import Clock
     from freepath.results import folder as results
 
+    if options.repeat != 1:
+        return _repeat(options, loaded.name)
     load = environment.load()
     parts = selection.checked(selection.resolve(options.device))
     if not selection.can_be_here(parts):
@@ -124,6 +119,23 @@ def execute(options: Namespace) -> int:
     if options.rows_only:
         return 0
     return _show(options, sweep.folder, cases, load, sweep)
+
+
+def _repeat(options: Namespace, name: str) -> int:
+    """Run the whole sweep several times into folders of one; returns the worst exit code."""
+    from freepath.results.folder import SUMMARY, new_folder
+
+    if options.repeat < 1 or options.json or (options.resume and not options.output):
+        raise UsageError("--repeat: expected 1 or more, no --json, and -o DIR with --resume")
+    base, worst = options.output or new_folder(name), 0
+    for number in range(1, options.repeat + 1):
+        folder = base / f"{name}-{number}"
+        resume = options.resume and (folder / SUMMARY).exists()
+        one = vars(options) | {"repeat": 1, "output": folder, "resume": resume}
+        if (code := execute(Namespace(**one))) == INTERRUPTED:
+            return code
+        worst = max(worst, code)
+    return worst
 
 
 def _run_in_processes(

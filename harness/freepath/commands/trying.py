@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import os
+import time
 from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import shtab
 
-from freepath.commands.arguments import add_device, positive
-from freepath.errors import FAILED
+from freepath.commands.arguments import add_device, add_output, add_sigma_t
+from freepath.errors import FAILED, INTERRUPTED
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -39,21 +40,15 @@ def add(commands: Any) -> None:
         metavar="FILE",
         help="measure it on this volume too: .vdb, .exr, .tif or .npy",
     ).complete = shtab.FILE
+    add_sigma_t(trying)
     trying.add_argument(
-        "--sigma-t",
-        type=positive,
-        default=1.0,
-        metavar="X",
-        help="extinction where the volume's density is 1 (default: 1)",
+        "--like",
+        default="",
+        metavar="NAME",
+        help="what to compare it with (default: `like:` of its front matter, or the nearest)",
     )
     add_device(trying, "part of the name, platform or driver of the device")
-    trying.add_argument(
-        "-o",
-        "--output",
-        type=Path,
-        metavar="DIR",
-        help="folder for checks, results and report (default: results/try-NAME-TIME)",
-    ).complete = shtab.DIRECTORY
+    add_output(trying, "checks, results and report", "try-NAME")
     trying.add_argument(
         "--every-check", action="store_true", help="the slow checks too, which take minutes"
     )
@@ -64,36 +59,21 @@ def add(commands: Any) -> None:
 
 def execute(options: Namespace) -> int:
     """Run it; returns the exit code."""
-    from freepath.commands.common import console_of, volume_of
+    from freepath.commands.common import console_of, own_folder, volume_of
     from freepath.device.selection import one_device
     from freepath.extras import candidate
-    from freepath.results.folder import ResultFolder, new_folder
+    from freepath.results.folder import new_folder
 
-    known, tracker = candidate.read(options.tracker)
-    volume = volume_of(options.volume, options.sigma_t) if options.volume else None
+    known, tracker, parent = candidate.read(options.tracker, options.like)
+    volume = volume_of(options.volume, options.sigma_t or 1.0) if options.volume else None
     path = options.output or new_folder(f"try-{tracker.name}")
-    ResultFolder(path)  # refuses one that holds a run
     device = one_device(options.device)
     console = console_of()
     console.print(f"{tracker.title}, on {device.info.label}", highlight=False, markup=False)
+    started = time.monotonic()
     candidate.build(device, known, tracker)
-    outcomes = _check(options, console, known, tracker, device)
-    path.mkdir(parents=True, exist_ok=True)
-    wrong = _say_verdict(console, outcomes, candidate.keep(outcomes, path))
-    if wrong or options.checks_only:
-        return FAILED if wrong else 0
-    config = path / candidate.CONFIG
-    config.write_text(
-        candidate.sweep_text(tracker, candidate.relatives(known, tracker), volume), "utf-8"
-    )
-    return _measure(console, config, (known, tracker), device)
-
-
-def _check(
-    options: Namespace, console: Console, known: Catalog, tracker: Tracker, device: Device
-) -> list[Outcome]:
-    from freepath.extras import candidate
-
+    compiling_s = time.monotonic() - started
+    own_folder(path, "try")
     chosen = candidate.checks_of(known, tracker, every=options.every_check)
     which = "all" if options.every_check else "fast"
     console.print(
@@ -101,23 +81,35 @@ def _check(
     )
     processes = min(2, os.cpu_count() or 1)
     with console.status("checking") as status:
+        outcomes, stopped = candidate.check(
+            chosen, options.tracker, device.info, processes, status.update, compiling_s
+        )
+    wrong = _say_verdict(console, outcomes, candidate.keep(outcomes, path), stopped)
+    if stopped == candidate.INTERRUPTED:
+        return INTERRUPTED
+    if wrong or options.checks_only:
+        return FAILED if wrong else 0
+    config = path / candidate.CONFIG
+    others = {one.name: one for one in (parent, *candidate.relatives(known, tracker))}
+    few = list(others.values())[: candidate.RELATIVES]
+    config.write_text(candidate.sweep_text(tracker, few, volume), "utf-8")
+    return _measure(console, config, (known, tracker, parent), device)
 
-        def tell(line: str) -> None:
-            status.update(line.strip())
 
-        return candidate.check(chosen, options.tracker, device.info, processes, tell)
+def _say_verdict(console: Console, outcomes: list[Outcome], kept: Path, stopped: str) -> bool:
+    """Say whether it is right, and what failed; tells whether it is wrong."""
+    from freepath.checks.outcome import SKIPPED
 
-
-def _say_verdict(console: Console, outcomes: list[Outcome], kept: Path) -> bool:
-    """Say whether it is right, and what failed; returns whether it is wrong."""
-    from freepath.extras import candidate
-
-    wrong = candidate.failed(outcomes)
+    wrong = [one for one in outcomes if one.wrong]
+    right = sum(not one.wrong and one.status != SKIPPED for one in outcomes)
     told = {"highlight": False, "markup": False, "soft_wrap": True}
+    if stopped:
+        console.print(f"{stopped}; {len(outcomes)} checks were run", **told)
     if not wrong:
-        skipped = len(outcomes) - candidate.passed(outcomes)
+        skipped = len(outcomes) - right
         beside = f", {skipped} do not apply" if skipped else ""
-        console.print(f"right: {candidate.passed(outcomes)} checks passed{beside}", **told)
+        verdict = "none failed so far" if stopped else "right"
+        console.print(f"{verdict}: {right} checks passed{beside}", **told)
         return False
     console.print(f"wrong: {len(wrong)} of {len(outcomes)} checks failed", **told)
     for one in wrong:
@@ -127,12 +119,10 @@ def _say_verdict(console: Console, outcomes: list[Outcome], kept: Path) -> bool:
     return True
 
 
-def _measure(
-    console: Console,
-    config: Path,
-    trackers: tuple[Catalog, Tracker],
-    device: Device,
-) -> int:
+Trackers = tuple["Catalog", "Tracker", "Tracker"]
+
+
+def _measure(console: Console, config: Path, trackers: Trackers, device: Device) -> int:
     """Measure it beside its relatives, write the report and say where it pays."""
     from freepath import api
     from freepath.commands.run import _shown_progress
@@ -140,18 +130,23 @@ def _measure(
     from freepath.show import report, table
     from freepath.show.report.text import sentences, summary
 
-    known, tracker = trackers
+    known, tracker, parent = trackers
     with _shown_progress(console) as listener:
         sweep = api.sweep(config, config.parent, known=known, devices=[device], listener=listener)
-        sweep.run()
+        try:
+            sweep.run()
+        except KeyboardInterrupt:
+            where = f"its folder is {config.parent}, which `freepath report` shows"
+            console.print(f"interrupted with {sweep.ended} of {sweep.total} cases; {where}")
+            return INTERRUPTED
     folder = sweep.folder
     found, page = report.write([folder.folder], None, "html")
     console.print("", summary(found), "")
     told = {"highlight": False, "markup": False, "soft_wrap": True}
     for line in sentences(found):
         console.print(line, **told)
-    for standing in candidate.standings(found, tracker):
-        console.print(f"{standing.question}:\n  {standing}", **told)
+    for line in candidate.beside_parent(folder.rows(), tracker.name, parent.name):
+        console.print(line, **told)
     console.print(f"wrote {page}", **told)
     failures = [row for row in table.failures(folder.rows()) if row["tracker"] == tracker.name]
     for row in failures:

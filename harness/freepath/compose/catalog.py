@@ -8,7 +8,12 @@ from typing import Annotated, Any
 
 from pydantic import ValidationInfo, create_model, field_validator
 
-from freepath.compose.kernel_files import CONTRACT, functions, split_front_matter
+from freepath.compose.kernel_files import (
+    CONTRACT,
+    ended_in_begin,
+    functions,
+    split_front_matter,
+)
 from freepath.config.axes import ESTIMANDS
 from freepath.config.base import Kind, Model
 from freepath.config.document import Document
@@ -138,6 +143,8 @@ class FrontMatter(Model):
     uses: Annotated[tuple[Annotated[str, Choice(USES)], ...], OneOrMore(optional=True)] = ()
     state: dict[str, Annotated[str, Text("real, mask or index, or an array of them", STATE)]] = {}
     """Fields that a path carries for this tracker: their names and types."""
+    like: Annotated[str, Text("a tracker's name", r"[A-Za-z]\w*")] | None = None
+    """The tracker that `freepath try` compares it with."""
     citation: Annotated[str, Text()] = ""
 
     @field_validator("shares_lookup", mode="before")
@@ -252,6 +259,10 @@ def _check_functions(file: Path, code: str, front: FrontMatter) -> None:
     if got not in (["begin", "step"], ["begin", "at_tentative"], ["at_tentative"]):
         what = "the functions begin and step, or at_tentative in place of step"
         raise _bad(file, f"expected {what}, got {' and '.join(got) or 'none'} (kernels/README.md)")
+    if ends := ended_in_begin(code):
+        what = f"expected begin to leave its path flying, got {ends[1]} there: only a path that "
+        what += "ends in step is counted, this one would be begun for ever (kernels/README.md)"
+        raise ConfigError([Problem(str(file), ends[0], 1, "", what)])
     if "step" not in got and ("majorant" not in front.needs or "control" in front.needs):
         raise _bad(file, "expected needs: [majorant], and no control, for at_tentative")
 

@@ -18,6 +18,7 @@ _ANSWERS = ("sampled_depth", "splat", "escape_through_depth")
 """What a tracker calls that is another thing for shadow rays, in light/shadow."""
 _FUNCTION = re.compile(r"^(?!else\b)\w[\w\s*]*?\b(\w+)\s*\([^;{}]*\)\s*\{", re.MULTILINE)
 _COMMENT = re.compile(r"/\*.*?\*/|//[^\n]*", re.DOTALL)
+_ENDS = re.compile(r"\bpath\s*->\s*live\s*&?=[^=]|\b(collide|escape\w*)\s*\(")
 _FRONT_MATTER = re.compile(
     r"\A\s*/\*---[ \t]*\n(?P<yaml>.*?)^[ \t]*---\*/(?:[ \t]*\n)?", re.DOTALL | re.MULTILINE
 )
@@ -39,6 +40,20 @@ def split_front_matter(text: str) -> tuple[str | None, str]:
 def functions(code: str) -> set[str]:
     """The functions that code defines."""
     return set(_FUNCTION.findall(_COMMENT.sub(" ", code)))
+
+
+def ended_in_begin(code: str) -> tuple[int, str] | None:
+    """The line of `begin` at which it ends a path, and by what; None where it does not."""
+    plain = _COMMENT.sub(lambda found: re.sub(r"[^\n]", " ", found[0]), code)
+    found = next((one for one in _FUNCTION.finditer(plain) if one[1] == "begin"), None)
+    if not found:
+        return None
+    depth, end = 1, found.end()
+    while depth and end < len(plain):
+        depth += {"{": 1, "}": -1}.get(plain[end], 0)
+        end += 1
+    ends = _ENDS.search(plain, found.end(), end)
+    return (plain.count("\n", 0, ends.start()) + 1, ends[1] or "path->live") if ends else None
 
 
 @dataclass(frozen=True)

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import json
-import math
 import tempfile
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from freepath.checks import registry
 from freepath.checks import session as checking
 from freepath.checks.model import Check
-from freepath.checks.outcome import SKIPPED, Outcome
+from freepath.checks.outcome import CRASHED, TIMEOUT, Outcome
 from freepath.checks.rig import Rig
 from freepath.checks.suite.common import everyone, homogeneous
 from freepath.checks.verdict import NotApplicable
@@ -22,13 +21,17 @@ from freepath.compose.catalog import Catalog, Tracker
 from freepath.device.opencl import Device, DeviceInfo
 from freepath.errors import CatalogError
 from freepath.results.folder import CHECKS
-from freepath.show.report.data import Report, known_to
-from freepath.show.table import seconds
+from freepath.show import answers, table
+from freepath.show.table import Row
 
 RELATIVES = 4
 """Trackers that a candidate is measured beside."""
 TIMEOUT_S = 60.0
 """A fast check takes a second or two: one that takes this long hangs."""
+SMOKE_S = 10.0
+"""The same of one with a few paths, where compiling took no time."""
+HANGS = "{}: a step never ended a path: does it call escape or collide where the ray is left?"
+INTERRUPTED = "interrupted"
 CONFIG = "try.yaml"
 SEED = 7
 ATMOSPHERE = {"exponential": {"sigma_t": 5, "scale_height": 0.3}}
@@ -37,11 +40,13 @@ PERIODIC = {"cosine": {"sigma_t": 2, "amplitude": 0.9, "periods": 3}}
 STOP = {"error": "5%", "time_noise": "5%", "at_most": "0.3 s"}
 
 
-def read(file: Path) -> tuple[Catalog, Tracker]:
-    """The shipped trackers with the one of a file.
+def read(file: Path, like: str = "") -> tuple[Catalog, Tracker, Tracker]:
+    """The shipped trackers with the one of a file, and its parent.
 
-    Raises CatalogError for a name that is taken, front matter that is wrong, and estimands that no
-    check knows the answer of.
+    That is `like`, else what its front matter calls so, else the one most like it.
+
+    Raises CatalogError for a name that is taken, front matter that is wrong, estimands that no
+    check knows the answer of, and a parent that is not there or estimates something else.
     """
     if not file.is_file():
         what = "a folder" if file.is_dir() else "nothing there"
@@ -55,7 +60,11 @@ def read(file: Path) -> tuple[Catalog, Tracker]:
             f"{file}:1:1: estimands: expected transmittance or free_path among them, for these "
             f"have checks, got {', '.join(tracker.estimands)}"
         )
-    return known, tracker
+    fits = [other.name for other in relatives(known, tracker)]
+    parent = like or tracker.like or fits[0]
+    if parent not in fits:
+        raise CatalogError(f"{file}: like: expected one of {', '.join(fits)}, got {parent}")
+    return known, tracker, known.trackers[parent]
 
 
 def checks_of(known: Catalog, tracker: Tracker, *, every: bool) -> list[tuple[int, Check]]:
@@ -85,11 +94,30 @@ def check(
     info: DeviceInfo,
     processes: int,
     tell: Callable[[str], None],
-) -> list[Outcome]:
-    """Run checks of a tracker on a device, in processes of their own."""
-    timeout = TIMEOUT_S if all("fast" in one.labels for _, one in chosen) else 5 * TIMEOUT_S
-    options = checking.Options(parallel=processes, trackers=(file,), timeout=timeout)
-    return checking.Session(chosen, options, tell).run(info)
+    compiling_s: float = 0.0,
+) -> tuple[list[Outcome], str]:
+    """Run checks of a tracker on a device, in processes of their own: a few paths first.
+
+    Returns what became of each, and why not all were run: it hangs, crashes, or was interrupted.
+    """
+    smoke = [one for one in chosen if "smoke" in one[1].labels]
+    left = [one for one in chosen if one not in smoke]
+    slow = TIMEOUT_S if all("fast" in one.labels for _, one in chosen) else 5 * TIMEOUT_S
+    ended: list[Outcome] = []
+    parts = [(smoke, round(SMOKE_S + 4 * compiling_s)), (left, slow)]
+    for part, timeout in (one for one in parts if one[0]):
+        options = checking.Options(parallel=processes, trackers=(file,), timeout=timeout)
+        session = checking.Session(part, options, tell)
+        try:
+            session.run(info)
+        except KeyboardInterrupt:
+            return ended + session.outcomes.get(info.label, []), INTERRUPTED
+        ended += session.outcomes.get(info.label, [])
+        if part is smoke:
+            for one in ended:
+                if one.status in (TIMEOUT, CRASHED):
+                    return ended, HANGS.format(one.text) if one.status == TIMEOUT else one.text
+    return ended, ""
 
 
 def keep(outcomes: Sequence[Outcome], folder: Path) -> Path:
@@ -100,13 +128,13 @@ def keep(outcomes: Sequence[Outcome], folder: Path) -> Path:
 
 
 def relatives(known: Catalog, tracker: Tracker) -> list[Tracker]:
-    """The trackers most like it: that share estimands, and what they need and promise."""
+    """Those that share an estimand, by how much alike they are in what they need and promise."""
     others = [
         other
         for other in known.trackers.values()
         if other.name != tracker.name and set(other.estimands) & set(tracker.estimands)
     ]
-    return sorted(others, key=lambda other: -_likeness(tracker, other))[:RELATIVES]
+    return sorted(others, key=lambda other: (-_likeness(tracker, other), len(other.name)))
 
 
 def _likeness(one: Tracker, other: Tracker) -> float:
@@ -151,56 +179,32 @@ def sweep_text(tracker: Tracker, others: Sequence[Tracker], volume: dict[str, An
     return "\n".join(lines) + "\n"
 
 
-def failed(outcomes: Sequence[Outcome]) -> list[Outcome]:
-    """The checks that it did not pass."""
-    return [one for one in outcomes if one.wrong]
+def beside_parent(rows: Sequence[Row], name: str, parent: str) -> list[str]:
+    """How many times as fast a tracker is as its parent to 1 %, at each majorant and tightness."""
+    lines = []
+    for group in table.groups(rows):
+        lines.append(f"{group[0]['medium']}, beside {parent}:")
+        at: dict[tuple[str, str], dict[str, Row]] = {}
+        for row in group:
+            of = at.setdefault((row["majorant"], row["tightness"]), {})
+            of.setdefault(row["tracker"], row)
+        for (majorant, tightness), of in sorted(at.items()):
+            if name in of and parent in of:
+                where = (
+                    f"{majorant}, tightness {float(tightness):g}" if tightness else "no majorant"
+                )
+                own, other = answers.case_of(of[name]), answers.case_of(of[parent])
+                lines.append(f"  {where}: {_in_words(own, other)}")
+        if lines[-1].endswith(":"):
+            lines.append("  no majorant and tightness that both were measured with")
+    return lines
 
 
-def passed(outcomes: Sequence[Outcome]) -> int:
-    """How many it passed."""
-    return sum(not one.wrong and one.status != SKIPPED for one in outcomes)
-
-
-@dataclass(frozen=True)
-class Standing:
-    """The candidate's soonest case of a question beside the soonest of its relatives."""
-
-    question: str
-    own: dict[str, Any] | None
-    other: dict[str, Any] | None
-
-    def __str__(self) -> str:
-        """One sentence."""
-        if self.own and "t1" in self.own["unknown"]:
-            return "not known: the variance of its scores is not settled"
-        if self.own is None:
-            return "never reaches 1 %: its bias is larger"
-        mine = f"1 % after {seconds(self.own['t1'])} ({self.own['method']})"
-        if self.other is None or "t1" in self.other["unknown"]:
-            return f"pays: {mine}, and none of its relatives is known to reach it"
-        factor = self.other["t1"] / self.own["t1"]
-        noise = math.hypot(known_to(self.own, "t1"), known_to(self.other, "t1"))
-        text = f"{mine}; {self.other['method']} after {seconds(self.other['t1'])}"
-        if abs(math.log(factor)) <= noise:
-            return f"pays nothing and costs nothing, within {100 * noise:.0f} %: {text}"
-        if factor > 1:
-            return f"pays: {factor:.2f} times as fast, known to {100 * noise:.0f} %: {text}"
-        return f"does not pay: takes {1 / factor:.2f} times as long: {text}"
-
-
-def standings(report: Report, tracker: Tracker) -> list[Standing]:
-    """Where it stands, for each question that it was measured on."""
-    found = []
-    for question in report.values("q"):
-        rows = [row for row in report.measured if row["q"] == question]
-        own = [row for row in rows if row["tracker"] == tracker.name]
-        if own:
-            others = [row for row in rows if row["tracker"] != tracker.name]
-            found.append(Standing(question, _soonest(own), _soonest(others)))
-    return found
-
-
-def _soonest(rows: Sequence[dict[str, Any]]) -> dict[str, Any] | None:
-    """The fastest that is known; else one that is not known, if it is there."""
-    reaching = [row for row in rows if isinstance(row["t1"], float)]
-    return min(reaching, key=lambda row: ("t1" in row["unknown"], row["t1"]), default=None)
+def _in_words(own: answers.Case | None, other: answers.Case | None) -> str:
+    if own is None or other is None:
+        return "it never reaches 1 %" if own is None else "only it reaches 1 %"
+    if not (own.settled and other.settled):
+        return "not known: the variance of its scores is not settled"
+    low, high = answers.ratio(other, own)[1:]
+    verdict = "faster" if low > 1 else "slower" if high < 1 else "no difference is known"
+    return f"{answers.times_as_fast(other, own)}: {verdict}"

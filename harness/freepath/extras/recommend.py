@@ -6,20 +6,23 @@ import dataclasses
 import json
 import math
 import re
+import shutil
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy import stats
 
 from freepath import api
 from freepath.cases import plan
 from freepath.compose.catalog import ANY, Catalog
 from freepath.device.opencl import Device
 from freepath.errors import NothingMatchedError, RunError
+from freepath.extras.renderers import RATES, Renderer, contains
+from freepath.measure.jobs import scenes_of
 from freepath.measure.ladder import Ladder
 from freepath.measure.sweep import Clock, Listener, Sweep
+from freepath.results.folder import RUN, SUMMARY, ResultFolder, Row, read_result
 from freepath.scene.volumes.reading import read_volume
 from freepath.show import answers
 from freepath.show.table import failures, number, uncertainty
@@ -29,12 +32,21 @@ RAYS = {"orthographic": {"resolution": [32, 32], "direction": [0.3, 0.2, 1]}}
 CELLS = (32, 16, 8, 4)
 """Voxels along a side of a majorant's cell."""
 TIGHTNESS = (1, 1.5, 2.5)
-SHARES = (0.25, 0.3, 0.2, 0.25)
-"""Of the budget, for each round."""
+STEPS = (1, 4)
+"""Of marching, in voxels."""
+FINEST_TREE = 512
+SHARES = (0.2, 0.25, 0.2, 0.2, 0.15)
+"""Of the budget, for each round; what one leaves is the others'."""
+WHAT = ("trackers", "majorants", "tightness", "finalists", "beyond the edge of the search")
+"""What a round is about."""
 TRACKERS, CASES, FINALISTS = 5, 5, 5
 """How many are left after each round."""
-PRECISION = ({"error": "10%", "time_noise": "10%"},) * 3 + ({"error": "1%", "time_noise": "1%"},)
+PRECISION = ({"error": "10%", "time_noise": "10%"},) * 3 + (
+    {"error": "1%", "time_noise": "1%"},
+) * 2
 LEAST_S = 0.05
+OVER = 1.25
+"""More than so many times its budget is told."""
 USUAL: dict[str, Any] = {"delta": {}}
 """The tracker that, with one majorant, ratios are of: measured too, where it is searched."""
 CONFIG = "recommended.yaml"
@@ -78,36 +90,115 @@ class Search:
     clock: Clock
     only: str = ""
     """A regular expression that names of trackers match."""
+    renderer: Renderer | None = None
+    """What is recommended is what it has; all the rest is measured for the ratio."""
     measured: int = 0
+    spent_s: float = 0.0
+    """Of the budget."""
+    beside_s: float = 0.15
+    """What a case of the last round took beside what it was given; a guess before the first."""
+    lacks: list[str] = dataclasses.field(default_factory=list)
+    """What the budget did not reach."""
+    edge: str = ""
+    """Whether the fastest lay at the edge of the search, and what lay beyond."""
+    dense: str = ""
+    """How dense the volume is."""
+    side: float = 1.0
+    """Of a voxel, the shortest, in the world."""
+    had: list[Axes] = dataclasses.field(default_factory=list)
+    """Points that the renderer has."""
     found: dict[str, Finding] = dataclasses.field(default_factory=dict)
     """By the name of the case, the last known of all rounds; without those that went wrong."""
+    rows: dict[str, tuple[Row, list[Row]]] = dataclasses.field(default_factory=dict)
+    """Its rows of summary.csv and samples.csv; of those that went wrong too."""
 
     def run(self) -> list[Finding]:
         """The finalists, the fastest first.
 
         Raises RunError where no case reaches the accuracy, or none is known to.
         """
-        shape, side = self.voxels()
+        shape, self.side = self.voxels()
         majorants = majorants_of(shape)
+        if self.renderer:
+            tracker = "ratio" if self.estimand == "transmittance" else "delta"
+            finest = majorants[-1]["octree"]["resolution"]
+            self.had = self.renderer.points(tracker, finest, self.side)
         points = [
             {"tracker": tracker, "majorant": majorants[middle_of(majorants)], "tightness": 1}
-            for tracker in self.trackers(side)
+            for tracker in self.trackers(self.side)
         ]
         usual = [one | {"majorant": "global"} for one in points if one["tracker"] == USUAL]
-        self._round(0, [*points, *self._global_only(points), *usual])
+        self._round(0, [*self.had, *points, *self._global_only(points), *usual])
         best = self._few(TRACKERS, by=lambda one: next(iter(one.axes["tracker"])))
         self._round(
             1, [one.axes | {"majorant": m, "tightness": 1} for one in best for m in majorants]
         )
         self._round(2, [one.axes | {"tightness": t} for one in self._few(CASES) for t in TIGHTNESS])
-        self._round(3, [one.axes for one in self._few(FINALISTS)])
-        finalists = sorted(self.found.values(), key=lambda one: one.rank)[:FINALISTS]
-        if not finalists[0].case.settled:
-            raise RunError(
-                "the fastest is not known: of no case is the variance settled; give it more time "
-                f"by --budget; what was measured is in {self.folder}"
-            )
-        return finalists
+        mine = sorted(filter(self.is_had, self.found.values()), key=lambda one: one.hope)
+        last = [*mine[:FINALISTS], *self._few(FINALISTS if not self.renderer else 2)]
+        self._round(3, [one.axes for one in {one.case.case: one for one in last}.values()])
+        self._beyond(majorants)
+        return self.finalists()
+
+    def is_had(self, one: Finding) -> bool:
+        """Whether the renderer has it; without one, all is had."""
+        return not self.renderer or any(contains(one.axes, point) for point in self.had)
+
+    def finalists(self) -> list[Finding]:
+        """The best that is known of what is had, the fastest first; raises RunError if none is."""
+        mine = sorted(filter(self.is_had, self.found.values()), key=lambda one: one.rank)
+        if not mine or not mine[0].case.settled:
+            what = f"that {self.renderer.title} has " if self.renderer else ""
+            why = f"nothing {what}is known to reach {100 * self.accuracy:g} %"
+            if mine:
+                why = "the fastest is not known: of no case is the variance settled; give it more "
+                why += "time by --budget"
+            raise RunError(f"{why}; what was measured is in {self.folder}")
+        return mine[:FINALISTS]
+
+    def _beyond(self, majorants: Sequence[Any]) -> None:
+        """Go on once where the fastest lies at the edge of the search."""
+        best = self.finalists()[0]
+        further = self._further(best.axes, majorants)
+        if not further:
+            return
+        if self.renderer:
+            self.had += further.values()
+        self.edge = f"the fastest lay at the edge of the search: {', '.join(further)}"
+        if not self._round(4, [best.axes, *further.values()]):
+            self.edge += "; what lies beyond was not measured"
+            return
+        now = self.finalists()[0]
+        beyond = any(contains(now.axes, point) for point in further.values())
+        self.edge += (
+            f"; beyond it {now.case.name} is faster, and what lies further was not measured"
+            if beyond
+            else "; one more was measured beyond, and is not faster"
+        )
+
+    def _further(self, axes: Axes, majorants: Sequence[Any]) -> dict[str, Axes]:
+        """The next points beyond the edges at which a point lies, by what is at its edge there."""
+        ((name, given),) = axes["tracker"].items()
+        found = {}
+        parameters = self.known.trackers[name].parameters
+        steps = RATES if self.renderer else STEPS
+        for key in (key for key, one in parameters.items() if one.unit == "length"):
+            for place, factor, what in ((0, 0.5, "smallest"), (-1, 2.0, "largest")):
+                if contains(given[key], float(steps[place] * self.side)):
+                    tracker = {name: given | {key: factor * given[key]}}
+                    found[f"the {what} {key}"] = axes | {"tracker": tracker}
+        if self.renderer or "majorant" not in self.known.trackers[name].needs:
+            return found
+        *others, tree = majorants
+        if axes["majorant"] == others[-1] != "global":
+            cells = [2 * count for count in axes["majorant"]["grid"]["resolution"]]
+            found["the finest grid"] = axes | {"majorant": {"grid": {"resolution": cells}}}
+        if contains(axes["majorant"], tree) and tree["octree"]["resolution"] < FINEST_TREE:
+            cells = 2 * tree["octree"]["resolution"]
+            found["the finest octree"] = axes | {"majorant": {"octree": {"resolution": cells}}}
+        if axes["tightness"] == TIGHTNESS[-1]:
+            found["the largest tightness"] = axes | {"tightness": 2 * TIGHTNESS[-1]}
+        return found
 
     def _few(
         self, count: int, by: Callable[[Finding], str] = lambda one: one.case.case
@@ -134,7 +225,7 @@ class Search:
             if tracker.channels == ANY or not re.search(self.only, tracker.name):
                 continue  # a volume is grey: those of any number of channels have twins of one
             lengths = [n for n, p in tracker.parameters.items() if p.unit == "length"]
-            for factor in (1, 4) if lengths else (1,):
+            for factor in STEPS if lengths else (1,):
                 found.append({tracker.name: dict.fromkeys(lengths, factor * side)})
         if not found:
             raise NothingMatchedError(f"no tracker of {self.estimand} matches '{self.only}'")
@@ -149,24 +240,23 @@ class Search:
             if "grid" not in self.known.trackers[name].majorants
         ]
 
-    def _round(self, turn: int, points: Sequence[Axes]) -> None:
-        """Measure cases, and note those that reach the accuracy."""
-        self.folder.mkdir(parents=True, exist_ok=True)
-        seconds = max(LEAST_S, self.budget_s * SHARES[turn] / len(points))
+    def _round(self, turn: int, points: Sequence[Axes]) -> int:
+        """Measure cases, as many as the budget has room for; returns how many.
+
+        Notes those that reach the accuracy, also where it is interrupted.
+        """
+        share = SHARES[turn] / sum(SHARES[turn:])
+        allowed = max(0.0, self.budget_s - self.spent_s) * share
+        fit = int(allowed / (LEAST_S + self.beside_s)) if turn else len(points)
+        if fit < len(points):
+            self.lacks.append(f"{WHAT[turn]}: {len(points) - fit} of {len(points)} cases")
+        if not (points := points[:fit]):
+            return 0
+        seconds = max(LEAST_S, allowed / len(points) - self.beside_s)
         stop = PRECISION[turn] | {"at_most": f"{seconds:.3g} s"}
         config = self.folder / f"round-{turn + 1}.yaml"
         config.write_text(self.config_text(points, stop), "utf-8")
-        sweep = self.measure(config)
-        by_id = {case.case_id: case for case in sweep.cases}
-        rows = sweep.folder.rows()
-        self.measured += sum(row["status"] == "ok" for row in rows)
-        for row in rows:
-            self.note(row, axes_of(by_id[row["case_id"]]))
-        if not self.found:
-            raise RunError(self._why_none(rows, sweep.folder.folder))
-
-    def measure(self, config: Path) -> Sweep:
-        """Run a config into the folder beside it."""
+        before = self.clock.outside_s
         sweep = api.sweep(
             config,
             config.with_suffix(""),
@@ -175,8 +265,56 @@ class Search:
             listener=self.listener,
             clock=self.clock,
         )
-        sweep.run()
-        return sweep
+        self.dense = self.dense or self._density(sweep)
+        try:
+            sweep.run()
+        finally:
+            rows = self._note_all(sweep)
+            took = self.clock.outside_s - before
+            self.spent_s += took
+            self.beside_s = max(0.0, took / len(points) - seconds)
+        if not self.found:
+            raise RunError(self._why_none(rows, sweep.folder.folder))
+        return len(points)
+
+    def _note_all(self, sweep: Sweep) -> list[Row]:
+        """Note the rows that a sweep has written."""
+        if not sweep.folder.holds_rows:
+            return []
+        by_id = {case.case_id: case for case in sweep.cases}
+        rows, rounds = read_result(sweep.folder.folder)
+        self.measured += sum(row["status"] == "ok" for row in rows)
+        for row in rows:
+            old = self.found.get(row["case"])
+            self.note(row, axes_of(by_id[row["case_id"]]))
+            if old is None or self.found.get(row["case"]) is not old:
+                own = [one for one in rounds if one["case_id"] == row["case_id"]]
+                self.rows[row["case"]] = row, own
+        return rows
+
+    def _density(self, sweep: Sweep) -> str:
+        """How dense the volume is along the rays of a sweep."""
+        case = sweep.cases[0]
+        scene = scenes_of([case], sweep.config.search_path)[case]
+        depths = scene.medium.optical_depth(scene.segments)
+        a_voxel = float(scene.bounds((1, 1, 1))[1].max()) * self.side
+        return (
+            f"optical depth along {len(depths)} rays: mean {depths.mean():.3g}, largest "
+            f"{depths.max():.3g}; of a voxel where it is densest {a_voxel:.3g} "
+            f"(a mean free path is {1 / a_voxel:.3g} voxels there)"
+        )
+
+    def keep(self) -> None:
+        """Write the last rows of every case into the folder itself, for `freepath report`."""
+        if not self.rows:
+            return
+        rounds = sorted(self.folder.glob(f"round-*/{SUMMARY}"))
+        folder = ResultFolder(self.folder)
+        folder.open([])
+        for row, own in self.rows.values():
+            folder.append(row, own)
+        folder.close()
+        shutil.copy(rounds[-1].with_name(RUN), self.folder / RUN)
 
     def note(self, row: dict[str, str], axes: Axes) -> None:
         """Keep what a row of summary.csv says of a case; what went wrong once is out."""
@@ -204,14 +342,14 @@ class Search:
         first, *others = (dict(point) for point in points)
         matrix = {"estimand": self.estimand, "medium": [self.medium], **first}
         lines = [
-            f"name: {self.folder.name}",
+            "name: recommend",
             f"seed: {SEED}",
-            f"rays: {json.dumps(RAYS)}",
+            f"rays: {_json(RAYS)}",
             "matrix:",
-            *(f"  {axis}: {json.dumps(value)}" for axis, value in matrix.items()),
+            *(f"  {axis}: {_json(value)}" for axis, value in matrix.items()),
             *(["include:"] if others else []),
-            *(f"  - {json.dumps(point)}" for point in others),
-            f"stop: {json.dumps(stop)}",
+            *(f"  - {_json(point)}" for point in others),
+            f"stop: {_json(stop)}",
         ]
         return "\n".join(lines) + "\n"
 
@@ -222,6 +360,11 @@ class Search:
         what = f"{self.estimand} to {100 * self.accuracy:g} %: the first case is the fastest"
         path.write_text(f"# {what}; the others came next.\n{text}", encoding="utf-8")
         return path
+
+
+def _json(value: Any) -> str:
+    """As YAML has it too: its escapes know no halves of a letter."""
+    return json.dumps(value, ensure_ascii=False)
 
 
 def needed(row: dict[str, str], accuracy: float) -> tuple[float, float] | None:
@@ -258,15 +401,8 @@ def middle_of(majorants: Sequence[Any]) -> int:
 
 def axes_of(case: plan.Case) -> Axes:
     """Tracker, majorant and tightness of a case, as a config has them."""
-    majorant = "global" if case.majorant is None else case.majorant.as_dict()
+    single = case.majorant is None or case.majorant.kind == "global"
+    majorant = "global" if single else case.majorant.as_dict()
     tightness = 1 if case.tightness is None else case.tightness
     tracker = {case.tracker: dict(case.params)}
     return {"tracker": tracker, "majorant": majorant, "tightness": tightness}
-
-
-def surely(first: answers.Case, second: answers.Case) -> float:
-    """The chance that the first is the faster one, errors of both taken as normal."""
-    spread = math.hypot(first.time_s * first.noise, second.time_s * second.noise) / 1.96
-    if not spread:
-        return 1.0
-    return float(stats.norm.cdf((second.time_s - first.time_s) / spread))
