@@ -22,7 +22,17 @@ from freepath.results.folder import (
 )
 from freepath.results.reading import facts
 from freepath.show.answers import Case
-from freepath.show.table import ROUGH, Row, along, bounces, lit, number, settled, uncertainty
+from freepath.show.table import (
+    ROUGH,
+    Row,
+    along,
+    bias,
+    bounces,
+    lit,
+    number,
+    settled,
+    uncertainty,
+)
 
 DEEPEST, HIGHEST = 1e-4, 10.0
 """Relative errors between which curves are drawn."""
@@ -153,6 +163,7 @@ def _record(row: Row, variants: list[tuple[str, str]], device: str) -> dict[str,
         "storage": row["storage"],
         "status": row["status"],
         "reason": row["reason"],
+        "bias_told": bias(row) if row["status"] == "ok" else "",
         "t": number(row, "time_per_sample_s"),
         "lookups": number(row, "lookups_per_sample"),
         "occupancy": number(row, "lane_occupancy"),
@@ -178,6 +189,12 @@ def known_to(record: dict[str, Any], name: str) -> float:
     if not isinstance(record[name], float):
         return 0.0
     return uncertainty(record[name], record["t"], record["tn"], record["vn"])
+
+
+def late(row: dict[str, Any]) -> float:
+    """The time to 1 %; infinite where that is not known, or never."""
+    known = isinstance(row["t1"], float) and "t1" not in row["unknown"]
+    return row["t1"] if known else float("inf")
 
 
 def _question(row: Row, *light: str) -> str:
@@ -240,7 +257,7 @@ def _confirmed(result: Path, records: dict[tuple, dict]) -> list[dict[str, Any]]
         reference = number(row, "reference")
         if record is None or None in values or not (predicted and measured and reference):
             continue
-        shown = ("q", "device", "method", "colour", "label", "tracker", "case")
+        shown = ("id", "q", "device", "method", "colour", "label", "tracker", "case")
         found.append(
             {name: record.get(name) for name in shown}
             | {
