@@ -98,7 +98,7 @@
     element("filter").value = state.get("filter") ?? "";
     accuracy = state.get("at") in TIMES ? state.get("at") : "t1";
     sorted = { column: columns.some((one) => one[1] === state.get("sort")) ? state.get("sort") : accuracy, up: !state.get("down") };
-    const one = rows.find((row) => row.case + " " + row.device === state.get("case"));
+    const one = rows.find((row) => row.q === asked() && row.case + " " + row.device === state.get("case"));
     isolated = one ? { field: "id", value: one.id, name: state.get("case") } : state.get("tracker") ? { field: "colour", value: state.get("tracker") } : null;
   }
   const matchesIsolated = (row) => !isolated || row[isolated.field] === isolated.value;
