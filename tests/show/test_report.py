@@ -11,6 +11,7 @@ import pytest
 
 from freepath.cli import main
 from freepath.errors import FreepathError
+from freepath.measure import pictures
 from freepath.results.folder import COLUMNS, CONFIRM_COLUMNS
 from freepath.show.report import load, write
 from freepath.show.report.pictures import picture
@@ -452,6 +453,40 @@ def test_curves_leave_the_axis_and_seven_trackers_have_colours(tmp_path):
     assert all(f">t{i}</text>" in drawn for i in range(7))
     assert ">t7</text>" not in drawn
     assert ">10 us</text>" in drawn
+
+
+def test_pictures_at_equal_time_say_whether_it_was(work, selector, opened):
+    (work / "x.yaml").write_text(
+        "name: x\nrender: true\nrays: {orthographic: {resolution: [16, 8]}}\n"
+        "matrix: {medium: {cloud: {resolution: 16, sigma_t: 8}}, tracker: [delta, ratio]}\n"
+        "stop: {samples: 500}\n"
+    )
+    assert main(["run", "x.yaml", "-o", "out", "-d", selector]) == 0
+    paths = sorted((work / "out" / pictures.EQUAL_TIME).glob("*.exr"))
+    for times, told in (
+        ((1e-5, 1.04e-5), "Each case had the same device time, within 5 %."),
+        ((1e-5, 1.6e-5), "Device times differ: 10 us to 16 us a pixel, a factor of 1.6."),
+    ):
+        for path, seconds in zip(paths, times, strict=True):
+            facts, parts = pictures.read_exr(path)
+            facts = {name: text for name, text in facts.items() if name.startswith("freepath:")}
+            facts |= {"freepath:time_s": str(seconds)}
+            base = path.with_suffix("")
+            pictures.write_exr(base, parts["mean"], parts["variance"], facts)
+        write([work / "out"], None, None)
+        page, complaints, _ = opened(work / "out" / "report.html")
+        assert page.inner_text("#renders-hint").startswith(told)
+    errors = page.locator("#renders figcaption").all_inner_texts()[1:]
+    found = [float(text.split("RMSE ")[1].removesuffix(" %")) for text in errors]
+    assert found == sorted(found)
+    page.locator(".pair").nth(2).click()
+    assert page.locator("#wipe").is_visible()
+    edge = "getComputedStyle(document.querySelector('#over')).clipPath"
+    assert page.evaluate(edge) == "inset(0px 50% 0px 0px)"
+    page.locator("#edge").fill("20")
+    assert page.evaluate(edge) == "inset(0px 80% 0px 0px)"
+    assert page.locator("#under").get_attribute("src") != page.locator("#over").get_attribute("src")
+    assert complaints == []
 
 
 def test_a_page_of_a_run_that_goes_on_says_so(asked_two, opened):

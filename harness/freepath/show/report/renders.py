@@ -153,7 +153,7 @@ def _panel(question: str, device: str, renders: list[Render]) -> dict[str, Any]:
     errors = [np.abs(one.mean - reference).mean(axis=2) / scale for one in renders]
     finite = [error[np.isfinite(error)] for error in errors]
     whites = [float(np.percentile(one, WHITE)) for one in finite if one.size]
-    brightest = float(np.median(whites)) if whites else 0.0
+    brightest = float(np.percentile(whites, 50, method="lower")) if whites else 0.0
     exposure = exposed(reference)[1]
     items = [
         {
