@@ -491,8 +491,8 @@ def test_pictures_at_equal_time_say_whether_it_was(work, selector, opened):
 
 def test_a_page_of_a_run_that_goes_on_says_so(asked_two, opened):
     for ended, told in (
-        ("running, or killed", "two: the run goes on, or was killed; 6 of 9 cases are here."),
-        ("interrupted", "two: the run ended: interrupted; 6 of 9 cases are here."),
+        ("running, or killed", "(running, or killed); 6 of 9 cases are here"),
+        ("interrupted", "(interrupted); 6 of 9 cases are here"),
         ("complete", None),
     ):
         facts = {"sessions": [{"ended": "complete"}, {"ended": ended}], "cases": [{}] * 9}
@@ -500,7 +500,7 @@ def test_a_page_of_a_run_that_goes_on_says_so(asked_two, opened):
         _, path = write([asked_two], None, None)
         page, _, _ = opened(path)
         found = page.locator("#unfinished")
-        assert (found.inner_text() if found.count() else None) == told
+        assert told in found.inner_text() if told else not found.count()
 
 
 SLACK = 4

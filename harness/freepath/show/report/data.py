@@ -206,12 +206,12 @@ def _question(row: Row, *light: str) -> str:
 def _errors(row: Row) -> dict[str, float | None]:
     """Errors relative to the reference; where it is unknown, to the estimate, taken as unbiased."""
     reference, variance = number(row, "reference"), number(row, "variance")
-    names = ("v", "b", "bias", "bias_width", "vt", "vl")
+    names = ("v", "b", "bias", "vt", "vl")
     known = reference is not None
     scale = abs((reference if known else number(row, "estimate")) or 0.0)
     if not scale or variance is None or row["status"] != "ok":
         return dict.fromkeys(names)
-    bias, stderr, rms = (number(row, c) or 0.0 for c in ("bias", "bias_stderr", "bias_rms"))
+    mean, rms = (number(row, column) or 0.0 for column in ("bias", "bias_rms"))
     # the square of a small transmittance may be no number any more
     relative = math.sqrt(variance) / scale
     relative *= relative
@@ -220,8 +220,7 @@ def _errors(row: Row) -> dict[str, float | None]:
     values = (
         relative,
         rms / scale,
-        bias / scale if known else None,
-        1.96 * stderr / scale,
+        mean / scale if known else None,
         relative * number(row, "time_per_sample_s"),
         relative * number(row, "lookups_per_sample"),
     )

@@ -37,7 +37,7 @@
   ];
   const SAME = ["lanes", "arithmetic", "storage", "device", "status"];
   const columns = all.filter(([, field]) => !SAME.includes(field) || new Set(rows.map((row) => row[field])).size > 1);
-  const alike = SAME.filter((field) => field !== "device" && field !== "status" && !columns.some((one) => one[1] === field));
+  const alike = SAME.filter((field) => field !== "device" && field !== "status" && rows[0][field] && !columns.some((one) => one[1] === field));
   const terms = { ...data.terms, xb: "how many times as fast as the baseline at 1 %", method: "tracker, majorant and tightness" };
 
   const options = (id, field, all) => {

@@ -22,7 +22,7 @@ from freepath.show.report.text import answers, dicts, environment
 FIELDS = (
     "id", "q", "device", "case", "label", "tracker", "majorant", "bound", "method", "x", "lanes",
     "arithmetic", "storage", "status", "reason", "t", "lookups", "occupancy", "tn", "vn",
-    "v", "b", "bias", "bias_width", "vt", "vl", "t10", "t1", "t01", "rough", "unknown", "lo", "hi",
+    "v", "b", "bias", "vt", "vl", "t10", "t1", "t01", "rough", "unknown", "lo", "hi",
     "colour", "xb", "bias_told",
 )  # fmt: skip
 """What of a record goes into the page."""
@@ -140,12 +140,12 @@ def _unfinished(report: Report) -> str:
     told = []
     for run, (_, records) in zip(report.runs, report.places, strict=True):
         last = next(iter(dicts(run.get("sessions"))[-1:]), {})
-        state = {"running, or killed": "goes on, or was killed"}.get(
-            str(last.get("ended")), f"ended: {last.get('ended')}"
-        )
-        if last.get("ended", "complete") != "complete":
-            total = len(dicts(run.get("cases")))
-            told.append(f"{run['name']}: the run {state}; {len(records)} of {total} cases are here")
+        ended, total = last.get("ended", "complete"), len(dicts(run.get("cases")))
+        if ended != "complete":
+            told.append(
+                f"{run['name']}: the run is not complete ({ended}); {len(records)} of {total} "
+                "cases are here, and what comes last, such as pictures, may be missing"
+            )
     lines = "".join(f"<p>{html.escape(one)}.</p>" for one in told)
     return f'<aside id="unfinished" role="status">{lines}</aside>' if told else ""
 
