@@ -414,6 +414,24 @@ def test_a_link_leads_to_a_state(asked_two, opened, browser):
     other.close()
 
 
+def test_a_label_isolates_its_tracker(asked_two, opened):
+    _, path = write([asked_two], None, None)
+    page, complaints, _ = opened(path)
+    box = page.locator("#figure-cost canvas").bounding_box()
+    for down in range(20, 400, 4):
+        page.mouse.click(box["x"] + box["width"] - 25, box["y"] + down)
+        state = page.evaluate("location.hash")
+        if "tracker=" in state:
+            break
+    name = state.split("tracker=")[1]
+    assert page.inner_text("#all") == f"Show all, not only {name}"
+    chosen = page.locator("tr[aria-selected=true]").all_inner_texts()
+    assert len(chosen) == 1
+    assert chosen[0].startswith(name)
+    page.evaluate("freepathReady()")
+    assert complaints == []
+
+
 def test_what_is_seen_can_be_saved(asked_two, opened):
     _, path = write([asked_two], None, None)
     page, complaints, _ = opened(path, accept_downloads=True)

@@ -259,6 +259,14 @@
     box.style.left = `${Math.max(4, right ? event.clientX - wide - 18 : x)}px`;
     box.style.top = `${Math.max(4, Math.min(innerHeight - box.offsetHeight - 4, event.clientY + 18))}px`;
   }
+  // Vega-Lite lets the pointer find only the layer that has the selection; labels and marks at the edge count too.
+  function touchable(part) {
+    for (const mark of part.marks ?? []) {
+      if (["text", "symbol"].includes(mark.type)) mark.interactive = true;
+      touchable(mark);
+    }
+    return part;
+  }
   function save(name, address) {
     const link = document.createElement("a");
     link.download = name;
@@ -295,7 +303,7 @@
     const spec = { ...plain, config: theme(), datasets: { ...plain.datasets, [source]: told }, autosize: { type: "fit-x", contains: "padding" } };
     const rowed = { occupancy: "colour", devices: "method" }[name];
     if (rowed) spec.height = 22 * Math.max(1, new Set(values.map((row) => row[rowed])).size);
-    views[name] = await vegaEmbed(figure.querySelector(".chart"), spec, { actions: false, renderer: "canvas", tooltip: tip });
+    views[name] = await vegaEmbed(figure.querySelector(".chart"), spec, { actions: false, renderer: "canvas", tooltip: tip, patch: touchable, logLevel: 1 }); // no word of labels that are none
     views[name].view.addEventListener("click", (event, item) => {
       if (item?.datum?.id === undefined) return;
       if (item.mark.marktype === "text") isolate("colour", item.datum.colour); else isolate("id", item.datum.id);
