@@ -113,6 +113,20 @@ def rewrite(path, mean, **changes):
     pictures.write_exr(base, mean, mean, told | changes)
 
 
+def test_the_worst_picture_comes_last_and_does_not_set_the_scale(result):
+    before, _ = panels(load([result]))
+    place = result / pictures.EQUAL_TIME
+    for row in read_rows(result / "summary.csv"):
+        if row["shadow"] == "ratio":
+            path = place / f"{pictures.stem(row)}.exr"
+            rewrite(path, 1000 * pictures.read_exr(path)[1]["mean"])
+    after, _ = panels(load([result]))
+    for one, other in zip(before, after, strict=True):
+        assert "delta" in other["items"][0]["method"]
+        assert other["items"][1]["rmse"] > 100 * other["items"][0]["rmse"]
+        assert other["brightest"] < 10 * one["brightest"]
+
+
 def test_pictures_that_cannot_be_shown_are_named(result, capsys):
     short, long = (sorted((result / f).glob("*.exr")) for f in (pictures.EQUAL_TIME, "pictures"))
     short[0].write_bytes(b"no picture")

@@ -11,6 +11,7 @@ import pytest
 
 from freepath.cli import main
 from freepath.errors import FreepathError
+from freepath.measure import pictures
 from freepath.results.folder import COLUMNS, CONFIRM_COLUMNS
 from freepath.show.report import load, write
 from freepath.show.report.pictures import picture
@@ -288,6 +289,7 @@ def opened(browser):
         page.on("request", lambda request: asked.append(request.url))
         page.goto(path.as_uri())
         page.wait_for_function("typeof vegaEmbed === 'function'")
+        page.locator("#figure-cost").scroll_into_view_if_needed()
         page.wait_for_selector("#figure-cost canvas")
         page.evaluate("freepathReady()")
         return page, complaints, asked
@@ -311,18 +313,18 @@ def test_the_page(result, opened):
     page.locator("#head th", has_text="time").click()
     assert column(page, 1 + page.locator("#head th").all_inner_texts().index("time"))[0] == "5 us"
     place = 1 + page.locator("#head th").all_inner_texts().index("to 1 %")
-    assert [text for text in column(page, place) if "~" in text] == ["~50 ms"]
+    assert [text for text in column(page, place) if "?" in text] == ["?50 ms"]
     page.fill("#filter", "ratio -x4")
     page.wait_for_function("document.querySelectorAll('#body tr').length === 2")
     assert all("ratio" in text for text in column(page, 1))
     page.fill("#filter", "delta")
     page.wait_for_function("document.querySelectorAll('#body tr').length === 6")
     page.evaluate("freepathReady()")
-    page.evaluate("scrollTo(0, 0)")
+    page.evaluate("document.querySelector('#figure-cost').scrollIntoView()")
     page.wait_for_timeout(300)
     page.evaluate("freepathReady()")
     box = page.locator("#figure-cost canvas").bounding_box()
-    tip = page.locator("#vg-tooltip-element.visible")
+    tip = page.locator("#tip:not([hidden])")
     for place in range(40):
         down = 0.25 + 0.15 * (place % 4)
         page.mouse.move(
@@ -344,6 +346,179 @@ def test_the_page_on_a_phone(result, opened, scheme):
     colour = page.evaluate("getComputedStyle(document.body).backgroundColor")
     assert (colour == "rgb(255, 255, 255)") == (scheme == "light")
     assert complaints == []
+
+
+@pytest.fixture
+def asked_two(tmp_path):
+    """Two questions; the second one has more at stake, and a case no line of the chart reaches."""
+    near = [row_of(1, "delta"), row_of(2, "ratio", seconds=5e-7)]
+    far = [
+        row_of(11, "delta", seconds=4e-6, medium="thick"),
+        row_of(12, "ratio", seconds=4e-7, medium="thick"),
+        row_of(13, "split", seconds=3e-7, medium="thick", variance_noise="1.4"),
+        row_of(14, "coarse", medium="thick", bias="7.5", bias_rms="7.5", time_to_1pct_s="inf"),
+    ]
+    return result_of(tmp_path / "two", near + far)
+
+
+def cards(page):
+    return page.locator(".card").all_inner_texts()
+
+
+def test_the_page_answers_first(asked_two, opened):
+    """Its sentence is that of Markdown, its ratio that of the table, to the last digit."""
+    _, path = write([asked_two], None, None)
+    page, complaints, _ = opened(path)
+    told = {
+        line.split(": At")[0]: "At" + line.split(": At")[1] for line in sentences(load([asked_two]))
+    }
+    thick, cloud = "transmittance, thick, 64 rays", "transmittance, cloud-64, 64 rays"
+    assert page.input_value("#question") == thick
+    assert page.inner_text(".sentence") == told[thick]
+    assert "10 (9.6 to 10) times as fast" in told[thick]
+    assert "10 (9.6 to 10) times as fast" in cards(page)[1]
+    heads = page.locator("#head th").all_inner_texts()
+    assert heads[:5] == ["case", "to 10 %", "to 1 %", "to 0.1 %", "x baseline"]
+    assert column(page, 1)[:2] == ["ratio, global x1", "delta, global x1"]
+    assert column(page, 5) == ["10", "1.0", "", ""]
+    page.select_option("#question", cloud)
+    assert page.inner_text(".sentence") == told[cloud]
+    assert column(page, 1) == ["ratio, global x1", "delta, global x1"]
+    page.fill("#filter", "thick")
+    page.wait_for_function(
+        "document.querySelector('#count').textContent.startsWith('0 of 2 cases')"
+    )
+    assert page.inner_text("#count") == "0 of 2 cases; 4 of other questions match"
+    header = page.locator("#head th", has_text="lookups").locator("button")
+    assert header.get_attribute("title") == "mean of the counted samples"
+    assert page.locator("#" + header.get_attribute("aria-describedby")).count() == 1
+    assert complaints == []
+
+
+def test_a_link_leads_to_a_state(asked_two, opened, browser):
+    _, path = write([asked_two], None, None)
+    page, _, _ = opened(path)
+    page.locator("#head th", has_text="lookups").click()
+    page.locator("#body tr", has_text="delta").click()
+    page.fill("#filter", "-coarse")
+    page.wait_for_function("location.hash.includes('filter=-coarse')")
+    other = browser.new_page()
+    other.goto(page.url)
+    other.wait_for_selector("#body tr")
+    assert other.input_value("#filter") == "-coarse"
+    assert other.locator("th[aria-sort=ascending]").inner_text() == "lookups"
+    assert "delta" in other.locator("tr[aria-selected=true]").inner_text()
+    assert other.locator("tr[aria-selected=false]").count() == 2
+    other.locator("#all").click()
+    assert other.locator("tr[aria-selected]").count() == 0
+    other.close()
+
+
+def test_a_label_isolates_its_tracker(asked_two, opened):
+    _, path = write([asked_two], None, None)
+    page, complaints, _ = opened(path)
+    box = page.locator("#figure-cost canvas").bounding_box()
+    for down in range(20, 400, 4):
+        page.mouse.click(box["x"] + box["width"] - 25, box["y"] + down)
+        state = page.evaluate("location.hash")
+        if "tracker=" in state:
+            break
+    name = state.split("tracker=")[1]
+    assert page.inner_text("#all") == f"Show all, not only {name}"
+    chosen = page.locator("tr[aria-selected=true]").all_inner_texts()
+    assert len(chosen) == 1
+    assert chosen[0].startswith(name)
+    page.evaluate("freepathReady()")
+    assert complaints == []
+
+
+def test_what_is_seen_can_be_saved(asked_two, opened):
+    _, path = write([asked_two], None, None)
+    page, complaints, _ = opened(path, accept_downloads=True)
+    saved = {}
+    for name, where in (("csv", "#csv"), ("svg", "text=SVG"), ("png", "text=PNG")):
+        with page.expect_download() as download:
+            page.locator(where).first.click()
+        with open(download.value.path(), "rb") as file:
+            saved[name] = file.read()
+    first = next(csv.DictReader(saved["csv"].decode().splitlines()))
+    assert (first["case"], float(first["to 1 %"])) == ("ratio, global x1", 0.004)
+    assert b"<svg" in saved["svg"][:200]
+    assert b"1000 %" in saved["svg"] and b"100 us" in saved["svg"]
+    assert saved["png"].startswith(b"\x89PNG")
+    assert complaints == []
+
+
+def test_curves_leave_the_axis_and_seven_trackers_have_colours(tmp_path):
+    """A bias of 15 times the mean is no plateau at 10; the eighth tracker is grey."""
+    rows = [row_of(i, f"t{i}", seconds=1e-6 * (i + 1)) for i in range(9)]
+    rows += [row_of(20, "off", bias="7.5", bias_rms="7.5", time_to_1pct_s="inf")]
+    report = load([result_of(tmp_path / "nine", rows)])
+    chart = picture(report, "cost").to_dict()
+    (panel,) = chart["concat"]
+    lines = next(one for one in panel["layer"] if one["mark"]["type"] == "line")
+    assert lines["mark"]["clip"]
+    assert "clamp" not in lines["encoding"]["y"]["scale"]
+    scale = next(
+        one["encoding"]["color"]["scale"] for one in panel["layer"] if one["mark"]["type"] == "text"
+    )
+    colours = dict(zip(scale["domain"], scale["range"], strict=True))
+    assert len({colours[f"t{i}"] for i in range(7)}) == 7
+    assert {colours["t7"], colours["t8"], colours["off"]} == {"#9a9ea6"}
+    svg = tmp_path / "p.svg"
+    write([tmp_path / "nine"], svg, None)
+    drawn = svg.read_text()
+    assert all(f">t{i}</text>" in drawn for i in range(7))
+    assert ">t7</text>" not in drawn
+    assert ">10 us</text>" in drawn
+
+
+def test_pictures_at_equal_time_say_whether_it_was(work, selector, opened):
+    (work / "x.yaml").write_text(
+        "name: x\nrender: true\nrays: {orthographic: {resolution: [16, 8]}}\n"
+        "matrix: {medium: {cloud: {resolution: 16, sigma_t: 8}}, tracker: [delta, ratio]}\n"
+        "stop: {samples: 500}\n"
+    )
+    assert main(["run", "x.yaml", "-o", "out", "-d", selector]) == 0
+    paths = sorted((work / "out" / pictures.EQUAL_TIME).glob("*.exr"))
+    for times, told in (
+        ((1e-5, 1.04e-5), "Each case had the same device time, within 5 %."),
+        ((1e-5, 1.6e-5), "Device times differ: 10 us to 16 us a pixel, a factor of 1.6."),
+    ):
+        for path, seconds in zip(paths, times, strict=True):
+            facts, parts = pictures.read_exr(path)
+            facts = {name: text for name, text in facts.items() if name.startswith("freepath:")}
+            facts |= {"freepath:time_s": str(seconds)}
+            base = path.with_suffix("")
+            pictures.write_exr(base, parts["mean"], parts["variance"], facts)
+        write([work / "out"], None, None)
+        page, complaints, _ = opened(work / "out" / "report.html")
+        assert page.inner_text("#renders-hint").startswith(told)
+    errors = page.locator("#renders figcaption").all_inner_texts()[1:]
+    found = [float(text.split("RMSE ")[1].removesuffix(" %")) for text in errors]
+    assert found == sorted(found)
+    page.locator(".pair").nth(2).click()
+    assert page.locator("#wipe").is_visible()
+    edge = "getComputedStyle(document.querySelector('#over')).clipPath"
+    assert page.evaluate(edge) == "inset(0px 50% 0px 0px)"
+    page.locator("#edge").fill("20")
+    assert page.evaluate(edge) == "inset(0px 80% 0px 0px)"
+    assert page.locator("#under").get_attribute("src") != page.locator("#over").get_attribute("src")
+    assert complaints == []
+
+
+def test_a_page_of_a_run_that_goes_on_says_so(asked_two, opened):
+    for ended, told in (
+        ("running, or killed", "(running, or killed); 6 of 9 cases are here"),
+        ("interrupted", "(interrupted); 6 of 9 cases are here"),
+        ("complete", None),
+    ):
+        facts = {"sessions": [{"ended": "complete"}, {"ended": ended}], "cases": [{}] * 9}
+        (asked_two / "run.json").write_text(json.dumps(facts))
+        _, path = write([asked_two], None, None)
+        page, _, _ = opened(path)
+        found = page.locator("#unfinished")
+        assert told in found.inner_text() if told else not found.count()
 
 
 SLACK = 4
@@ -382,7 +557,9 @@ def test_ten_thousand_rows(work, selector, browser):
     header = page.locator("#head th", has_text="rel. var.")
     timed("sort", header.click, "document.querySelector('th[aria-sort=ascending]')")
     some = "document.querySelector('#place').textContent.endsWith('of 1')"
-    timed("filter", lambda: page.fill("#filter", "ratio-p=7, x2 homogeneous-1-3"), some)
+    asked = page.locator("#question option", has_text="homogeneous-1-3").get_attribute("value")
+    page.select_option("#question", asked)
+    timed("filter", lambda: page.fill("#filter", "ratio-p=7, x2"), some)
     page.close()
     print(", ".join(f"{name} {seconds:.2f} s" for name, seconds in took.items()))
     assert complaints == []

@@ -99,6 +99,15 @@ def times_as_fast(baseline: Case, one: Case) -> str:
     return f"{middle} ({low} to {high}) times as fast"
 
 
+def leading(cases: Iterable[Case], wanted: str = "") -> tuple[list[Case], Case] | None:
+    """The fastest with those not significantly slower, and the baseline; None if none is known."""
+    known = [one for one in cases if one.settled]
+    if not known:
+        return None
+    places = soonest([(one.time_s, one.noise) for one in known])
+    return [known[place] for place in places], baseline_of(known, wanted)
+
+
 def sentence(
     cases: Sequence[Case], accuracy: float = 0.01, wanted: str = "", failed: int = 0
 ) -> str:
@@ -111,26 +120,26 @@ def sentence(
     unranked = {"their variance is not settled": len(cases) - len(known), "they failed": failed}
     beside = [f"not ranked, as {why}: {count}" for why, count in unranked.items() if count]
     told = f"At {100 * accuracy:g} %: "
-    if not known:
+    found = leading(known, wanted)
+    if not found:
         why = (
             "the variance of no case is settled; measure longer" if cases else "no case reaches it"
         )
         return told + "; ".join([why, *beside]) + "."
-    places = soonest([(one.time_s, one.noise) for one in known])
-    best, baseline = known[places[0]], baseline_of(known, wanted)
+    (best, *close), baseline = found
     if best is baseline:
         told += f"{best.name} is the fastest"
     else:
         told += f"{best.name} is {times_as_fast(baseline, best)} as {baseline.name}"
-    told += f", biased by {_percent(best.bias)}" if best.biased else ""
-    if len(places) > 1:
-        told += f" (not significantly slower: {known[places[1]].name}"
-        told += f" and {len(places) - 2} more)" if len(places) > 2 else ")"
+    told += f", biased by {percent(best.bias)}" if best.biased else ""
+    if close:
+        told += f" (not significantly slower: {close[0].name}"
+        told += f" and {len(close) - 1} more)" if len(close) > 1 else ")"
     others = [one for one in known if one.biased != best.biased]
     if others:
         other = min(others, key=lambda one: one.time_s)
         what = "fastest without measurable bias"
-        what = f"biased by {_percent(other.bias)}" if other.biased else what
+        what = f"biased by {percent(other.bias)}" if other.biased else what
         same = other is baseline
         told += f"; {what}: {other.name}"
         told += "" if same else f", {times_as_fast(baseline, other)}"
@@ -139,5 +148,6 @@ def sentence(
     return "; ".join([told, *beside]) + "."
 
 
-def _percent(share: float) -> str:
+def percent(share: float) -> str:
+    """A bias with one digit."""
     return f"{100 * share:.1g} %"

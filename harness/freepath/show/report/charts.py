@@ -14,21 +14,29 @@ import altair as alt
 
 from freepath.show.report.axes import (
     APART,
-    CASE,
-    COSTS,
-    ERROR,
+    BELOW,
+    DATA,
+    HUES,
+    INK,
+    NUMBER,
+    PERCENT,
+    SECONDS,
     TIME,
     below,
+    beyond,
     colour_of,
     dash_of,
     devices_of,
     error_axis,
     hover_of,
+    labels,
     log_x,
     log_y,
+    rules,
     shape_of,
+    strength,
 )
-from freepath.show.report.data import DEEPEST, Report
+from freepath.show.report.data import DEEPEST, HIGHEST, Report
 from freepath.show.table import UNSETTLED
 
 POINTS = 32
@@ -36,69 +44,82 @@ RMSE = "sqrt(pow(datum.b, 2) + datum.v * datum.t / datum.time)"
 """freepath.measure.ladder, for a record of a page."""
 
 
+FLOORED = "datum.b < {0} ? max(datum.t, datum.v * datum.t / ({0} * {0} - datum.b * datum.b)) : 0"
+"""The time from which a case's error is below {0}; 0 if it never is."""
+
+
 def cost(report: Report) -> alt.LayerChart:
     """RMSE over time of each case; a band shows the interval of the one that is pointed at."""
     hover = hover_of()
     noise = "0.5 * datum.v * datum.t / datum.time / pow(datum.error, 2)"
     width = f"{noise} * sqrt(pow(datum.vn || 0, 2) + pow(datum.tn || 0, 2))"
+    rows = alt.Chart(alt.NamedData("rows"))
+    colour, x = colour_of(report), log_x("time:Q", TIME, nice=False)
+    pointed = alt.when(hover).then(alt.value(INK)).otherwise(colour)
+    encoded = {"x": x, "y": error_axis(), "color": pointed, "detail": "id:N"}
     base = (
-        alt.Chart(alt.NamedData("rows"))
-        .transform_calculate(grid=f"sequence(0, {POINTS + 1})")
+        rows.transform_calculate(grid=f"sequence(0, {POINTS + 1})")
         .transform_flatten(["grid"])
         .transform_calculate(time=f"datum.t * pow(datum.hi / datum.t, datum.grid / {POINTS})")
-        .transform_calculate(error=RMSE)
-        .transform_calculate(
-            error=f"max(datum.error, {DEEPEST})",
-            width=width,
-            samples="datum.time / datum.t",
-        )
-        .encode(x=log_x("time:Q", TIME), detail="id:N")
+        .transform_calculate(error=f"max({RMSE}, 1e-12)")
+        .transform_calculate(width=width)
     )
-    lines = base.mark_line().encode(
-        y=error_axis(),
-        color=colour_of(report),
+    lines = base.mark_line(clip=True).encode(
+        **encoded,
         strokeDash=dash_of(report),
-        strokeWidth=alt.condition(hover, alt.value(4), alt.value(1.6)),
+        opacity=strength(),
+        strokeWidth={
+            "condition": [
+                {"param": "hover", "empty": False, "value": 4},
+                {"test": "datum.lead", "value": 2.2},
+            ],
+            "value": 1.3,
+        },
     )
     near = (
-        base.mark_point(filled=True)
+        base.mark_point(filled=True, clip=True, tooltip=DATA)
         .encode(
-            y=error_axis(),
-            color=colour_of(report),
+            **encoded,
             shape=shape_of(report),
-            opacity=alt.condition("datum.grid == 0", alt.value(1), alt.value(0)),
-            size=alt.condition("datum.grid == 0", alt.value(36), alt.value(150)),
-            tooltip=[
-                *CASE,
-                alt.Tooltip("time:Q", title=TIME, format=".3~e"),
-                alt.Tooltip("error:Q", title=ERROR, format=".3~e"),
-                alt.Tooltip("width:Q", title="+- (95 %), of it", format=".2~%"),
-                alt.Tooltip("samples:Q", title="samples", format=".3~s"),
-                *COSTS,
-            ],
+            opacity=alt.condition("datum.grid == 0 && !datum.faded", alt.value(1), alt.value(0)),
+            size=alt.condition("datum.grid == 0", alt.value(50), alt.value(150)),
         )
         .add_params(hover)
     )
     band = (
         base.transform_calculate(
-            error=f"max({DEEPEST}, datum.error * (1 - datum.width))",
+            error="datum.error * max(1e-3, 1 - datum.width)",
             top="datum.error * (1 + datum.width)",
         )
         .mark_area(clip=True)
         .encode(
-            y=error_axis(),
+            **encoded | {"color": colour},
             y2="top:Q",
-            color=colour_of(report),
             opacity=alt.condition(hover, alt.value(0.25), alt.value(0)),
         )
     )
-    return band + lines + near
+    start = "(datum.v + datum.b * datum.b > {0} * {0} ? ({1} || datum.t) : 0)"
+    above = start.format(HIGHEST, f"({FLOORED.format(HIGHEST)})")
+    ends = [
+        beyond(rows, FLOORED.format(DEEPEST), DEEPEST, "triangle-down"),
+        beyond(rows, above, HIGHEST, "triangle-up"),
+    ]
+    ends = [one.encode(**encoded | {"color": colour}, opacity=strength()) for one in ends]
+    last = RMSE.replace("datum.time", "datum.hi")
+    named = labels(
+        report,
+        rows.transform_filter("datum.lead"),
+        "hi:Q",
+        f"log(clamp({last}, {DEEPEST}, {HIGHEST})) / LN10",
+        "0.23",
+    )
+    return alt.layer(rules(), band, lines, near, *ends, named)
 
 
 def pareto(report: Report) -> alt.LayerChart:
     """The least RMSE that any case has after a time, and which case that is; a line a device.
 
-    Of cases whose variance is known.
+    Of cases whose variance is known; an error below the axis is a mark where the line leaves it.
     """
     base = (
         alt.Chart(alt.NamedData("rows"))
@@ -107,52 +128,71 @@ def pareto(report: Report) -> alt.LayerChart:
         .transform_flatten(["grid"])
         .transform_calculate(time=f"datum.lo * pow(datum.hi / datum.lo, datum.grid / {2 * POINTS})")
         .transform_filter("datum.time >= datum.t * 0.999999")
-        .transform_calculate(error=f"max({DEEPEST}, {RMSE})")
+        .transform_calculate(error=f"max(1e-12, {RMSE})")
         .transform_joinaggregate(best="min(error)", groupby=["grid", "device"])
         .transform_filter("datum.error <= datum.best * 1.000001")
         .transform_joinaggregate(first="min(t)", groupby=["grid", "device"])
         .transform_filter("datum.t <= datum.first")
-        .encode(x=log_x("time:Q", TIME), y=error_axis())
+        .encode(x=log_x("time:Q", TIME, nice=False), y=error_axis())
     )
-    lines = base.mark_line(color="#888", strokeWidth=1.5)
+    lines = base.mark_line(color="#888", strokeWidth=1.5, clip=True)
     if len(devices_of(report)) > 1:
         lines = lines.encode(strokeDash=dash_of(report))
-    points = base.mark_point(filled=True, size=60, opacity=1).encode(
+    points = base.mark_point(filled=True, size=60, opacity=1, clip=True, tooltip=DATA).encode(
+        color=colour_of(report), shape=alt.Shape("device:N").legend(None)
+    )
+    floor = (
+        base.transform_filter(f"datum.error < {DEEPEST}")
+        .transform_joinaggregate(leaves="min(time)", groupby=["device"])
+        .transform_filter("datum.time <= datum.leaves")
+        .transform_calculate(error=f"{DEEPEST}")
+        .mark_point(filled=True, size=90, shape="triangle-down", tooltip=DATA, opacity=1)
+        .encode(color=colour_of(report))
+    )
+    changes = [
+        part.transform_window(before="lag(label)", groupby=["device"], sort=[alt.SortField("time")])
+        .transform_filter("datum.label != datum.before")
+        .mark_text(align="left", dx=7, dy=-9, fontSize=11, limit=150, cursor="pointer")
+        .encode(text="colour:N", color=colour_of(report))
+        for part in (base.transform_filter(f"datum.error >= {DEEPEST}"), floor)
+    ]
+    return alt.layer(rules(), lines, points, floor, *changes)
+
+
+def _over_tightness(report: Report, field: str, title: str, notation: str) -> alt.LayerChart:
+    line = ["label", "device", "bound"]
+    base = alt.Chart(alt.NamedData("rows")).transform_filter(
+        f"datum.x !== null && datum.{field} > 0"
+    )
+    encoded = base.encode(
+        x=alt.X("x:Q").scale(type="log", nice=False).axis(title="tightness", format="~g", **APART),
+        y=log_y(f"{field}:Q", title, notation),
         color=colour_of(report),
-        shape=alt.Shape("device:N").legend(None),
-        tooltip=[
-            *CASE,
-            alt.Tooltip("time:Q", title=TIME, format=".3~e"),
-            alt.Tooltip("error:Q", title=ERROR, format=".3~e"),
-        ],
+        detail=[f"{name}:N" for name in line],
+        opacity=strength(),
     )
-    return lines + points
-
-
-def _over_tightness(report: Report, field: str, title: str) -> alt.LayerChart:
-    base = (
-        alt.Chart(alt.NamedData("rows"))
-        .transform_filter(f"datum.x !== null && datum.{field} > 0")
-        .encode(
-            x=alt.X("x:Q").scale(type="log").axis(title="tightness", format="~g", **APART),
-            y=log_y(f"{field}:Q", title),
-            color=colour_of(report),
-            detail=["label:N", "device:N", "bound:N"],
-        )
+    lines = encoded.mark_line().encode(strokeDash=dash_of(report))
+    points = encoded.mark_point(filled=True, size=36, tooltip=DATA)
+    ends = (
+        base.transform_joinaggregate(least=f"min({field})", most=f"max({field})")
+        .transform_calculate(one="datum.lead ? 1 : 0")
+        .transform_joinaggregate(leads="sum(one)", end="max(x)", groupby=line)
+        .transform_filter("datum.leads && datum.x == datum.end")
+        .transform_calculate(lead="datum.colour")
     )
-    lines = base.mark_line().encode(strokeDash=dash_of(report))
-    points = base.mark_point(filled=True, size=36)
-    return lines + points.encode(shape=shape_of(report), tooltip=[*CASE, *COSTS])
+    gap = "(0.05 * log(datum.most / datum.least) / LN10)"
+    named = labels(report, ends, "x:Q", f"log(datum.{field}) / LN10", gap)
+    return alt.layer(lines, points.encode(shape=shape_of(report, "bound")), named)
 
 
 def tightness_time(report: Report) -> alt.LayerChart:
     """Variance x time over tightness."""
-    return _over_tightness(report, "vt", "relative variance x time [s]")
+    return _over_tightness(report, "vt", "relative variance x time", SECONDS)
 
 
 def tightness_lookups(report: Report) -> alt.LayerChart:
     """Variance x lookups over tightness."""
-    return _over_tightness(report, "vl", "relative variance x lookups")
+    return _over_tightness(report, "vl", "relative variance x lookups", NUMBER)
 
 
 def lights(report: Report) -> alt.Chart:
@@ -166,27 +206,31 @@ def lights(report: Report) -> alt.Chart:
         .mark_line(point=True)
         .encode(
             x=alt.X("light:N").sort(order).axis(title="light", labelLimit=160, labelAngle=-25),
-            y=log_y("best:Q", "relative variance x time [s]"),
-            color=colour_of(report),
+            y=log_y("best:Q", "relative variance x time"),
+            color=colour_of(report).legend(),
             detail=["label:N", "device:N"],
-            tooltip=["label:N", "light:N", alt.Tooltip("best:Q", format=".3~e")],
         )
     )
 
 
-def lookups(report: Report) -> alt.Chart:
+def lookups(report: Report) -> alt.LayerChart:
     """Lookups are not time: one against the other."""
-    return (
+    base = (
         alt.Chart(alt.NamedData("rows"))
         .transform_filter("datum.lookups > 0")
-        .mark_point(filled=True, size=60)
         .encode(
-            x=log_x("lookups:Q", "lookups a sample"),
-            y=log_y("t:Q", "time a sample [s]"),
+            x=log_x("lookups:Q", "lookups per sample", NUMBER),
+            y=log_y("t:Q", "time per sample"),
             color=colour_of(report),
-            shape=alt.Shape("bound:N").title("majorant"),
-            tooltip=[*CASE, *COSTS],
+            opacity=strength(),
         )
+    )
+    some = len({row["bound"] for row in report.measured}) > 1
+    shape = alt.Shape("bound:N").title("majorant").legend(BELOW if some else None)
+    named = base.transform_filter("datum.lead").encode(text="lead:N")
+    return alt.layer(
+        base.mark_point(filled=True, size=60, tooltip=DATA).encode(shape=shape),
+        named.mark_text(align="left", dx=8, fontSize=11, limit=150, cursor="pointer"),
     )
 
 
@@ -194,12 +238,11 @@ def occupancy(report: Report) -> alt.Chart:
     """The share of lanes at work, by tracker."""
     return (
         alt.Chart(alt.NamedData("rows"))
-        .mark_tick(thickness=3, size=12)
+        .mark_tick(thickness=3, size=12, tooltip=DATA)
         .encode(
             x=alt.X("occupancy:Q").scale(domain=[0, 1]).axis(title="lane occupancy", format="%"),
             y=alt.Y("colour:N").title(None).axis(labelLimit=150),
-            color=colour_of(report).legend(None),
-            tooltip=[*CASE, *COSTS],
+            color=colour_of(report),
         )
     )
 
@@ -211,17 +254,12 @@ def devices(report: Report) -> alt.Chart:
         .transform_fold(["t10", "t1", "t01"], as_=["error", "seconds"])
         .transform_filter("isNumber(datum.seconds)")
         .transform_calculate(error="{t10: '10 %', t1: '1 %', t01: '0.1 %'}[datum.error]")
-        .mark_point(filled=True, size=60, opacity=0.9)
+        .mark_point(filled=True, size=60, opacity=0.9, tooltip=DATA)
         .encode(
-            x=log_x("seconds:Q", f"{TIME} until the RMSE is as given"),
+            x=log_x("seconds:Q", f"{TIME} to an RMSE"),
             y=alt.Y("method:N").title(None).axis(labelLimit=170),
-            color=alt.Color("device:N").scale(scheme="set1").legend(below(report)),
+            color=alt.Color("device:N").scale(range=HUES).legend(below(report)),
             shape=alt.Shape("error:N").scale(domain=["10 %", "1 %", "0.1 %"]).title("RMSE"),
-            tooltip=[
-                *CASE,
-                alt.Tooltip("error:N", title="RMSE"),
-                alt.Tooltip("seconds:Q", title="after [s]", format=".3~e"),
-            ],
         )
     )
 
@@ -229,7 +267,7 @@ def devices(report: Report) -> alt.Chart:
 def confirm(report: Report) -> alt.LayerChart:
     """Measured over predicted RMSE, with the interval of what was measured."""
     base = alt.Chart(alt.NamedData("confirmed")).encode(
-        x=log_x("predicted:Q", "predicted relative RMSE")
+        x=log_x("predicted:Q", "predicted relative RMSE", PERCENT)
     )
     near = alt.Scale(domain=[0.5, 1.5], clamp=True)
     y = alt.Y("ratio:Q", scale=near, title="measured / predicted")
@@ -240,15 +278,9 @@ def confirm(report: Report) -> alt.LayerChart:
         y2="high:Q",
         color=colour_of(report),
     )
-    points = base.mark_point(filled=True, size=40).encode(
+    points = base.mark_point(filled=True, size=40, tooltip=DATA).encode(
         y=y,
         color=colour_of(report),
-        tooltip=[
-            *CASE,
-            alt.Tooltip("samples:Q", title="samples a ray"),
-            alt.Tooltip("predicted:Q", format=".3~e"),
-            alt.Tooltip("ratio:Q", title="measured / predicted", format=".3f"),
-        ],
     )
     return alt.layer(*rules, intervals, points)
 

@@ -22,7 +22,17 @@ from freepath.results.folder import (
 )
 from freepath.results.reading import facts
 from freepath.show.answers import Case
-from freepath.show.table import ROUGH, Row, along, bounces, lit, number, settled, uncertainty
+from freepath.show.table import (
+    ROUGH,
+    Row,
+    along,
+    bias,
+    bounces,
+    lit,
+    number,
+    settled,
+    uncertainty,
+)
 
 DEEPEST, HIGHEST = 1e-4, 10.0
 """Relative errors between which curves are drawn."""
@@ -153,6 +163,7 @@ def _record(row: Row, variants: list[tuple[str, str]], device: str) -> dict[str,
         "storage": row["storage"],
         "status": row["status"],
         "reason": row["reason"],
+        "bias_told": bias(row) if row["status"] == "ok" else "",
         "t": number(row, "time_per_sample_s"),
         "lookups": number(row, "lookups_per_sample"),
         "occupancy": number(row, "lane_occupancy"),
@@ -180,6 +191,12 @@ def known_to(record: dict[str, Any], name: str) -> float:
     return uncertainty(record[name], record["t"], record["tn"], record["vn"])
 
 
+def late(row: dict[str, Any]) -> float:
+    """The time to 1 %; infinite where that is not known, or never."""
+    known = isinstance(row["t1"], float) and "t1" not in row["unknown"]
+    return row["t1"] if known else float("inf")
+
+
 def _question(row: Row, *light: str) -> str:
     """What a row answers: only rows of one question are compared. Without a light: in any light."""
     told = [*light, bounces(row)] if lit(row) else []
@@ -189,12 +206,12 @@ def _question(row: Row, *light: str) -> str:
 def _errors(row: Row) -> dict[str, float | None]:
     """Errors relative to the reference; where it is unknown, to the estimate, taken as unbiased."""
     reference, variance = number(row, "reference"), number(row, "variance")
-    names = ("v", "b", "bias", "bias_width", "vt", "vl")
+    names = ("v", "b", "bias", "vt", "vl")
     known = reference is not None
     scale = abs((reference if known else number(row, "estimate")) or 0.0)
     if not scale or variance is None or row["status"] != "ok":
         return dict.fromkeys(names)
-    bias, stderr, rms = (number(row, c) or 0.0 for c in ("bias", "bias_stderr", "bias_rms"))
+    mean, rms = (number(row, column) or 0.0 for column in ("bias", "bias_rms"))
     # the square of a small transmittance may be no number any more
     relative = math.sqrt(variance) / scale
     relative *= relative
@@ -203,8 +220,7 @@ def _errors(row: Row) -> dict[str, float | None]:
     values = (
         relative,
         rms / scale,
-        bias / scale if known else None,
-        1.96 * stderr / scale,
+        mean / scale if known else None,
         relative * number(row, "time_per_sample_s"),
         relative * number(row, "lookups_per_sample"),
     )
@@ -240,7 +256,7 @@ def _confirmed(result: Path, records: dict[tuple, dict]) -> list[dict[str, Any]]
         reference = number(row, "reference")
         if record is None or None in values or not (predicted and measured and reference):
             continue
-        shown = ("q", "device", "method", "colour", "label", "tracker", "case")
+        shown = ("id", "q", "device", "method", "colour", "label", "tracker", "case")
         found.append(
             {name: record.get(name) for name in shown}
             | {

@@ -6,28 +6,48 @@ import contextlib
 import html
 import json
 import os
+import re
 from collections import Counter
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
 from freepath import __version__
+from freepath.results.columns import OF_SUMMARY
 from freepath.show.report.charts import ACROSS, CHARTS, useful
 from freepath.show.report.data import Report
 from freepath.show.report.renders import panels
-from freepath.show.report.text import environment
+from freepath.show.report.text import answers, dicts, environment
 
 FIELDS = (
     "id", "q", "device", "case", "label", "tracker", "majorant", "bound", "method", "x", "lanes",
     "arithmetic", "storage", "status", "reason", "t", "lookups", "occupancy", "tn", "vn",
-    "v", "b", "bias", "bias_width", "vt", "vl", "t10", "t1", "t01", "rough", "unknown", "lo", "hi",
-    "colour",
+    "v", "b", "bias", "vt", "vl", "t10", "t1", "t01", "rough", "unknown", "lo", "hi",
+    "colour", "xb", "bias_told",
 )  # fmt: skip
 """What of a record goes into the page."""
 
 
-def page(report: Report) -> str:
+TERMS = {
+    "lookups": "lookups_per_sample",
+    "t": "time_per_sample_s",
+    "occupancy": "lane_occupancy",
+    "v": "variance",
+    "bias": "bias",
+    "t10": "time_to_10pct_s",
+    "t1": "time_to_1pct_s",
+    "t01": "time_to_0.1pct_s",
+} | {name: name for name in ("lanes", "arithmetic", "storage", "status")}
+"""Fields of the table, with the columns of summary.csv whose meanings explain them."""
+MORE = {
+    "v": "; over the squared reference",
+    "bias": ", with its 95 % interval; in brackets the RMS over rays, which decides",
+}
+
+
+def page(report: Report, baseline: str = "") -> str:
     """The page of a report; its `left_out` then names what the page could not show."""
+    told = sorted(answers(report, baseline), key=lambda one: -one["stake"])
     renders, report.left_out = panels(report)
     shown = {
         name: {"title": CHARTS[name][1], "spec": _specification(report, name)}
@@ -37,6 +57,8 @@ def page(report: Report) -> str:
     data = {
         "fields": FIELDS,
         "rows": [[_rounded(row.get(name)) for name in FIELDS] for row in report.rows],
+        "answers": told,
+        "terms": _terms(),
         "confirmed": report.confirmed,
         "charts": shown,
         "renders": renders,
@@ -45,6 +67,7 @@ def page(report: Report) -> str:
     parts = {
         "@TITLE@": html.escape(title),
         "@STYLE@": _asset("page.css"),
+        "@UNFINISHED@": _unfinished(report),
         "@CHECKS@": "".join(_checks(run) for run in report.runs if run["checks"]),
         "@LEFTOUT@": _left_out(report.left_out),
         "@ENVIRONMENT@": "".join(map(_environment, report.runs)),
@@ -101,6 +124,30 @@ def _checks(run: dict[str, Any]) -> str:
         f"<section><h2>Is it right?</h2><p>{told}.</p>"
         f"<details><summary>Checks</summary><dl>{rows}</dl></details></section>"
     )
+
+
+def _terms() -> dict[str, str]:
+    """What headers of the table mean, by their fields; without the marks of Markdown."""
+    meanings = {
+        field: re.sub(r"\[([^]]*)\]\([^)]*\)|`", r"\1", OF_SUMMARY[column].meaning)
+        for field, column in TERMS.items()
+    }
+    return {field: f"{meaning}{MORE.get(field, '')}" for field, meaning in meanings.items()}
+
+
+def _unfinished(report: Report) -> str:
+    """What runs had not ended when the page was made, and how far they were."""
+    told = []
+    for run, (_, records) in zip(report.runs, report.places, strict=True):
+        last = next(iter(dicts(run.get("sessions"))[-1:]), {})
+        ended, total = last.get("ended", "complete"), len(dicts(run.get("cases")))
+        if ended != "complete":
+            told.append(
+                f"{run['name']}: the run is not complete ({ended}); {len(records)} of {total} "
+                "cases are here, and what comes last, such as pictures, may be missing"
+            )
+    lines = "".join(f"<p>{html.escape(one)}.</p>" for one in told)
+    return f'<aside id="unfinished" role="status">{lines}</aside>' if told else ""
 
 
 def _left_out(told: list[str]) -> str:

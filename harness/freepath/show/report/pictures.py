@@ -6,7 +6,7 @@ import warnings
 from typing import Any
 
 from freepath.errors import FreepathError, did_you_mean
-from freepath.show.report.data import Report
+from freepath.show.report.data import Report, late
 
 MOST = 80
 """Cases that a panel shows, those that reach 1 % soonest: of more, none could be told apart."""
@@ -16,6 +16,7 @@ def picture(report: Report, name: str, columns: int = 2) -> Any:
     """Return a chart by its name, as an altair chart with its data in it."""
     import altair
 
+    from freepath.show.report.axes import leaders, led
     from freepath.show.report.charts import ACROSS, CHARTS, useful
 
     if name not in CHARTS:
@@ -31,6 +32,7 @@ def picture(report: Report, name: str, columns: int = 2) -> Any:
     for question in dict.fromkeys(row[panel_of] for row in source):
         rows = [row for row in source if row[panel_of] == question]
         rows = rows if name in ACROSS else soonest(rows)
+        rows = rows if name == "confirm" else led(rows, leaders(report))
         size = {"width": 400} if name in ("occupancy", "devices") else {"width": 400, "height": 300}
         chart = make(report).properties(title=question, **size)
         panels.append(_with_data(chart, altair.InlineData(values=rows)))
@@ -46,14 +48,7 @@ def picture(report: Report, name: str, columns: int = 2) -> Any:
 
 def soonest(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """At most MOST rows, those that reach 1 % first; never and what is not known last."""
-    if len(rows) <= MOST or "t1" not in rows[0]:
-        return rows
-
-    def late(row: dict[str, Any]) -> float:
-        known = isinstance(row["t1"], float) and "t1" not in row["unknown"]
-        return row["t1"] if known else float("inf")
-
-    return sorted(rows, key=late)[:MOST]
+    return rows if len(rows) <= MOST or "t1" not in rows[0] else sorted(rows, key=late)[:MOST]
 
 
 def _with_data(chart: Any, data: Any) -> Any:
@@ -89,6 +84,8 @@ def _still(part: Any) -> Any:
     if not isinstance(part, dict):
         return part
     part = {key: value for key, value in part.items() if key != "params"}
-    if "param" in part.get("condition", {}):
-        part = {key: value for key, value in part.items() if key != "condition"}
+    if "condition" in part:
+        found = part.pop("condition")
+        kept = [one for one in (found if isinstance(found, list) else [found]) if "test" in one]
+        part |= {"condition": kept} if kept else {}
     return {key: _still(value) for key, value in part.items()}

@@ -7,6 +7,7 @@ inverse of its variance. The pictures' own samples are not among these.
 from __future__ import annotations
 
 import base64
+import math
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -27,7 +28,7 @@ from freepath.measure.pictures import (
     write_png,
 )
 from freepath.results.folder import PLACE
-from freepath.show.report.data import Report
+from freepath.show.report.data import Report, late
 
 MOST = 40
 """Pictures of a question: those that reach 1 % soonest."""
@@ -35,7 +36,8 @@ WIDEST = 256
 """Pixels along a side that the page shows; larger pictures are thinned out, not averaged: the noise
 is what they are to show."""
 WHITE = 99.0
-"""The percentile of all errors of a question that is the brightest colour."""
+"""The percentile of a picture's errors that is the brightest colour, of the middle picture: the
+worst would leave the best black."""
 # black, purple, red, orange, pale yellow; equal steps look equal (after Matplotlib's inferno, CC0)
 COLOURS = np.array([
     (0, 0, 4), (31, 12, 72), (85, 15, 109), (136, 34, 106), (186, 54, 85),
@@ -145,12 +147,13 @@ def rmse_of(mean: np.ndarray, reference: np.ndarray, variance: float) -> float:
 
 
 def _panel(question: str, device: str, renders: list[Render]) -> dict[str, Any]:
-    renders = sorted(renders, key=lambda one: _late(one.record["t1"]))[:MOST]
+    renders = sorted(renders, key=lambda one: late(one.record))[:MOST]
     reference, variance = reference_of(renders)
     scale = abs(float(np.nanmean(reference))) or 1.0
     errors = [np.abs(one.mean - reference).mean(axis=2) / scale for one in renders]
-    finite = np.concatenate([error[np.isfinite(error)] for error in errors])
-    brightest = float(np.percentile(finite, WHITE)) if finite.size else 0.0
+    finite = [error[np.isfinite(error)] for error in errors]
+    whites = [float(np.percentile(one, WHITE)) for one in finite if one.size]
+    brightest = float(np.percentile(whites, 50, method="lower")) if whites else 0.0
     exposure = exposed(reference)[1]
     items = [
         {
@@ -164,6 +167,7 @@ def _panel(question: str, device: str, renders: list[Render]) -> dict[str, Any]:
         }
         for one, error in zip(renders, errors, strict=True)
     ]
+    items.sort(key=lambda one: math.inf if one["rmse"] is None else one["rmse"])
     return {
         "q": question,
         "device": device,
@@ -171,10 +175,6 @@ def _panel(question: str, device: str, renders: list[Render]) -> dict[str, Any]:
         "brightest": brightest,
         "items": items,
     }
-
-
-def _late(time_s: float | str | None) -> float:
-    return time_s if isinstance(time_s, float) else float("inf")
 
 
 def _finite(value: float) -> float | None:

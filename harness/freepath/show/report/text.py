@@ -8,12 +8,20 @@ from typing import Any
 from rich.markup import escape
 from rich.table import Table
 
-from freepath.show.answers import sentence
+from freepath.show.answers import (
+    digits,
+    leading,
+    percent,
+    ratio,
+    sentence,
+    times_as_fast,
+)
 from freepath.show.markdown import table_of as table_lines
 from freepath.show.markdown import text_of
 from freepath.show.report.data import LADDER, Report, answered, known_to
 from freepath.show.table import FAILED, marked, seconds, short, soonest
 
+ACCURACIES = dict(zip(LADDER, (0.1, 0.01, 0.001), strict=True))
 TARGETS = dict(zip(LADDER, ("to 10 %", "to 1 %", "to 0.1 %"), strict=True))
 HEADER = ("case", "device", "lookups", "time", "occ.", "rel. var.", "bias (RMS)", *TARGETS.values())
 
@@ -41,18 +49,56 @@ def _winner(reaching: list[dict[str, Any]], name: str) -> str:
     return f"{_time(best, name)}, {best['method']}{also}"
 
 
-def sentences(report: Report, baseline: str = "") -> list[str]:
-    """The answer at 1 % to each question on each device."""
-    several = len(report.values("device")) > 1
+def answers(report: Report, baseline: str = "") -> list[dict[str, Any]]:
+    """For each question and device: a card for each accuracy, and what is at stake.
+
+    That is how many times as fast the fastest case with lookups is as the baseline: a closed form
+    is there only where nobody needs a tracker. Records get `xb`, their ratio to the baseline.
+    """
     found: dict[tuple[str, str], list[dict[str, Any]]] = {}
     for row in report.rows:
         found.setdefault((row["q"], row["device"]), []).append(row)
     lines = []
     for (question, device), rows in found.items():
-        cases = [one for one in map(answered, rows) if one]
         failed = sum(row["status"] in FAILED for row in rows)
-        told = f"{question}, on {device}" if several else question
-        lines.append(f"{told}: {sentence(cases, 0.01, baseline, failed)}")
+        cards, stake = {}, 0.0
+        for name, accuracy in ACCURACIES.items():
+            reached = [(one, row) for row in rows if (one := answered(row, name))]
+            cases = [one for one, _ in reached]
+            card = {"sentence": sentence(cases, accuracy, baseline, failed), "id": None}
+            cards[name] = card
+            known = leading(cases, baseline)
+            if not known:
+                continue
+            (best, *close), base = known
+            ids = {id(one): row["id"] for one, row in reached}
+            card |= {
+                "id": ids[id(best)],
+                "base_id": ids[id(base)],
+                "name": best.name,
+                "time": marked(best.time_s, best.noise),
+            }
+            card["ratio"] = "" if best is base else times_as_fast(base, best)
+            card |= {"base": base.name, "close": len(close)}
+            card["bias"] = (
+                f"biased by {percent(best.bias)}" if best.biased else "no measurable bias"
+            )
+            if name == "t1":
+                for one, row in reached:
+                    row["xb"] = digits(ratio(base, one)[0]) if one.settled else None
+                timed = [one.time_s for one, row in reached if row["lookups"] and one.settled]
+                stake = base.time_s / min(timed, default=math.inf)
+        lines.append({"q": question, "device": device, "cards": cards, "stake": stake})
+    return lines
+
+
+def sentences(report: Report, baseline: str = "") -> list[str]:
+    """The answer at 1 % to each question on each device."""
+    several = len(report.values("device")) > 1
+    lines = []
+    for one in answers(report, baseline):
+        told = f"{one['q']}, on {one['device']}" if several else one["q"]
+        lines.append(f"{told}: {one['cards']['t1']['sentence']}")
     return lines
 
 
@@ -80,9 +126,6 @@ def cells(row: dict[str, Any]) -> list[str]:
     """A case's row of the full table."""
     if row["v"] is None:
         return [row["method"], row["device"], *[""] * 4, row["status"], *[""] * len(TARGETS)]
-    known = row["bias"] is not None
-    bias = f"{100 * row['bias']:+.2g}±{100 * row['bias_width']:.1g}%" if known else ""
-    bias += f" ({100 * row['b']:.1g}%)" if row["b"] else ""
     return [
         row["method"],
         row["device"],
@@ -90,7 +133,7 @@ def cells(row: dict[str, Any]) -> list[str]:
         seconds(row["t"]),
         f"{100 * row['occupancy']:.0f}%",
         short(row["v"]),
-        bias,
+        row["bias_told"],
         *(_time(row, name) for name in TARGETS),
     ]
 
@@ -116,15 +159,16 @@ def environment(run: dict[str, Any]) -> list[tuple[str, str]]:
     config = run.get("config")
     if isinstance(config, dict):
         facts.append(("config", str(config.get("name", ""))))
-    for session in _dicts(run.get("sessions")):
+    for session in dicts(run.get("sessions")):
         facts += [(name, str(session[name])) for name in ("started", "ended") if name in session]
         facts += _flat(session.get("host"))
-    for device in _dicts(run.get("devices")):
+    for device in dicts(run.get("devices")):
         facts += _flat(device, "device ")
     return facts
 
 
-def _dicts(value: Any) -> list[dict[str, Any]]:
+def dicts(value: Any) -> list[dict[str, Any]]:
+    """Those of a list that are dictionaries: run.json may hold anything."""
     return [one for one in value if isinstance(one, dict)] if isinstance(value, list) else []
 
 

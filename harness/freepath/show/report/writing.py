@@ -66,7 +66,7 @@ def made(
     if chosen == "html":
         from freepath.show.report.page import page
 
-        return report, page(report).encode(), chosen
+        return report, page(report, baseline).encode(), chosen
     if chosen == "md":
         from freepath.show.report.text import markdown
 
