@@ -13,7 +13,7 @@ BUDGET = {
     "checks": 4600,
     "kernels": 3100,
     "scene": 3000,
-    "show": 3110,
+    "show": 3150,
     "measure": 2400,
     "config": 2100,
     "commands": 1700,
