@@ -94,7 +94,7 @@ def execute(options: Namespace) -> int:
     from freepath.commands.common import console_of, volume_of
     from freepath.commands.run import _shown_progress
     from freepath.compose import catalog
-    from freepath.device.selection import one_device
+    from freepath.device.selection import first
     from freepath.errors import UsageError
     from freepath.extras import recommend
     from freepath.measure.sweep import Clock
@@ -107,13 +107,13 @@ def execute(options: Namespace) -> int:
     folder = options.output or new_folder(f"recommend-{options.volume.stem}")
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise UsageError(f"{folder}: expected a folder that is empty or not there yet")
-    device = one_device(options.device)
+    part = first(options.device)
     console = console_of()
     told = {"highlight": False, "markup": False, "soft_wrap": True}
     with _shown_progress(console, rows=False) as listener:
         search = recommend.Search(
             known,
-            device,
+            part,
             folder,
             medium,
             options.estimand,
@@ -126,7 +126,7 @@ def execute(options: Namespace) -> int:
         finalists = search.run()
     console.print(
         f"{options.volume.name}, {options.estimand} to {100 * options.accuracy:g} %, on "
-        f"{device.info.label}",
+        f"{part.infos[0].label}",
         **told,
     )
     cases = [one.case for one in search.found.values()]

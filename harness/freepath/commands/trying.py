@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from freepath.checks.outcome import Outcome
     from freepath.compose.catalog import Catalog, Tracker
     from freepath.device.opencl import Device
+    from freepath.device.selection import Part
 
 
 def add(commands: Any) -> None:
@@ -65,7 +66,7 @@ def add(commands: Any) -> None:
 def execute(options: Namespace) -> int:
     """Run it; returns the exit code."""
     from freepath.commands.common import console_of, volume_of
-    from freepath.device.selection import one_device
+    from freepath.device.selection import first, one_device
     from freepath.extras import candidate
     from freepath.results.folder import ResultFolder, new_folder
 
@@ -73,7 +74,7 @@ def execute(options: Namespace) -> int:
     volume = volume_of(options.volume, options.sigma_t) if options.volume else None
     path = options.output or new_folder(f"try-{tracker.name}")
     ResultFolder(path)  # refuses one that holds a run
-    device = one_device(options.device)
+    device, part = one_device(options.device), first(options.device)
     console = console_of()
     console.print(f"{tracker.title}, on {device.info.label}", highlight=False, markup=False)
     candidate.build(device, known, tracker)
@@ -86,7 +87,7 @@ def execute(options: Namespace) -> int:
     config.write_text(
         candidate.sweep_text(tracker, candidate.relatives(known, tracker), volume), "utf-8"
     )
-    return _measure(console, config, (known, tracker), device)
+    return _measure(console, config, (known, tracker), part)
 
 
 def _check(
@@ -131,19 +132,20 @@ def _measure(
     console: Console,
     config: Path,
     trackers: tuple[Catalog, Tracker],
-    device: Device,
+    part: Part,
 ) -> int:
     """Measure it beside its relatives, write the report and say where it pays."""
     from freepath import api
     from freepath.commands.run import _shown_progress
     from freepath.extras import candidate
+    from freepath.measure import worker
     from freepath.show import report, table
     from freepath.show.report.text import sentences, summary
 
     known, tracker = trackers
     with _shown_progress(console) as listener:
-        sweep = api.sweep(config, config.parent, known=known, devices=[device], listener=listener)
-        sweep.run()
+        sweep = api.sweep(config, config.parent, known=known, listener=listener)
+        worker.run(sweep, part)
     folder = sweep.folder
     found, page = report.write([folder.folder], None, "html")
     console.print("", summary(found), "")

@@ -16,8 +16,9 @@ from scipy import stats
 from freepath import api
 from freepath.cases import plan
 from freepath.compose.catalog import ANY, Catalog
-from freepath.device.opencl import Device
+from freepath.device.selection import Part
 from freepath.errors import NothingMatchedError, RunError
+from freepath.measure import worker
 from freepath.measure.ladder import Ladder
 from freepath.measure.sweep import Clock, Listener, Sweep
 from freepath.scene.volumes.reading import read_volume
@@ -65,7 +66,8 @@ class Search:
     """Rounds of sweeps in one volume, each of fewer cases that are measured longer."""
 
     known: Catalog
-    device: Device
+    part: Part
+    """A driver with one device."""
     folder: Path
     medium: Axes
     """The volume as a config has it."""
@@ -171,11 +173,10 @@ class Search:
             config,
             config.with_suffix(""),
             known=self.known,
-            devices=[self.device],
             listener=self.listener,
             clock=self.clock,
         )
-        sweep.run()
+        worker.run(sweep, self.part)
         return sweep
 
     def note(self, row: dict[str, str], axes: Axes) -> None:
