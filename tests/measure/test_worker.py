@@ -2,19 +2,22 @@
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
 import time
 
+import numpy as np
 import psutil
 import pytest
 
 from freepath import api
 from freepath.errors import ResultError, RunError
-from freepath.measure import worker
+from freepath.measure import pictures, worker
 from freepath.results import folder as results
 from freepath.results.folder import read_rows
+from freepath.show.report import writing
 
 FRONT = """/*---
 title: A tracker that {0}
@@ -240,7 +243,14 @@ def test_a_file_that_is_removed_under_way(planted, device, name):
         assert len(rows()) == 2
 
 
-def test_a_folder_that_is_removed_and_a_full_disk(command, work):
+def test_a_folder_that_is_removed_under_way(planted, device):
+    sweep = api.sweep("planted.yaml", "out", devices=[device])
+    sweep.listener.row = lambda row: shutil.rmtree(planted / "out", ignore_errors=True)
+    with pytest.raises(ResultError, match="was removed while a run writes there"):
+        sweep.run()
+
+
+def test_a_full_disk(command, work):
     limited = ["bash", "-c", 'ulimit -f 2; trap "" XFSZ; exec "$@"', "-", *command]
     done = ended(limited, env=os.environ | {"PYTHONDONTWRITEBYTECODE": "1"})
     assert done.returncode == 8
@@ -269,3 +279,26 @@ def test_a_link_in_a_folder_from_somebody_else_is_not_followed(planted, device, 
     assert victim.read_bytes() == before
     for part in ("summary.csv.part", "run.json.part", "samples.csv.part"):
         assert not (planted / "out" / part).exists()
+
+
+def test_a_report_and_a_picture_replace_a_link(planted, device, tmp_path):
+    api.sweep("planted.yaml", "out", devices=[device]).run()
+    victim = planted / "victim"
+    victim.write_text("mine")
+    report = planted / "out" / "report.md"
+    report.symlink_to(victim)
+    writing.write([planted / "out"], None, "md")
+    assert "delta" in report.read_text()
+    base = tmp_path / "pictures" / "one"
+    base.parent.mkdir()
+    for name in ("one.exr", "one.part.exr", "one.png", "one.part.png"):
+        base.with_name(name).symlink_to(victim)
+    pixels = np.ones((2, 2, 1))
+    pictures.write_exr(base, pixels, pixels, {})
+    pictures.write_mean(base, pixels, {})
+    assert pictures.read_exr(base.with_name("one.exr"))[1]["mean"].shape == (2, 2, 1)
+    assert victim.read_text() == "mine"
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "pictures" / "equal-time").symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(results.FreepathError, match="equal-time is a symbolic link"):
+        pictures.write_exr(tmp_path / pictures.EQUAL_TIME / "one", pixels, pixels, {})
