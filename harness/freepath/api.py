@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from freepath.compose.catalog import Catalog
     from freepath.config import Config
     from freepath.device.opencl import Device
-    from freepath.device.selection import Parts
     from freepath.measure.sweep import Sweep
 
 
@@ -22,7 +21,7 @@ def sweep(  # noqa: PLR0913 (what a sweep is made of; most has a default)
     config: str | Path | Config,
     output: str | Path | None = None,
     *,
-    devices: Sequence[Device],
+    devices: Sequence[Device] = (),
     axes: Sequence[str] = (),
     known: Catalog | None = None,
     cases: list[Case] | None = None,
@@ -34,7 +33,8 @@ def sweep(  # noqa: PLR0913 (what a sweep is made of; most has a default)
 
     `config` is a path, the name of a config that ships, or one that is loaded; `output` the folder
     for the results (default: results/NAME-TIME, with `resume` the newest of these). `devices` are
-    open; `axes` are what -a takes. `known` are the trackers (default: the
+    open, for a sweep in this process; `measure.worker.run` opens its own in another one, which is
+    watched. `axes` are what -a takes. `known` are the trackers (default: the
     shipped ones), `cases` those of the config that are wanted (default: all). A `listener` and a
     `clock` may be given. Raises FreepathError with the message that the command line prints.
     """
@@ -60,16 +60,18 @@ def run(
     devices: Sequence[str] = (),
     axes: Sequence[str] = (),
     progress: Callable[[float, int, str], None] | bool = True,
+    timeout_s: float | None = None,
 ) -> Any:
     """Run a config, a path or the name of one that ships, as `freepath run` does.
 
     `output` is the folder for the results (default: results/NAME-TIME), `devices` and `axes` are
-    what -d and -a take. `progress` is called with how many cases are done, of how many, and what
-    is being done; True prints a line per case. Returns what `load` does. Raises FreepathError with
-    the message that the command line prints, and KeyboardInterrupt with what was measured left in
-    the folder.
+    what -d and -a take, `timeout_s` what --timeout takes. `progress` is called with how many cases
+    are done, of how many, and what is being done; True prints a line per case. Returns what `load`
+    does. Raises FreepathError with the message that the command line prints, and KeyboardInterrupt
+    with what was measured left in the folder.
     """
     from freepath.device import selection
+    from freepath.measure import worker
     from freepath.measure.sweep import Listener
 
     listener = Listener()
@@ -77,37 +79,15 @@ def run(
         listener.row = _say
     elif callable(progress):
         listener.progress = progress
-    parts = selection.checked(selection.resolve(list(devices)))
-    if not selection.can_be_here(parts):
-        return load(_run_elsewhere(config, output, parts, axes, quiet=progress is not True))
-    opened = selection.opened(parts)
-    prepared = sweep(config, output, devices=opened, axes=axes, listener=listener)
-    prepared.run()
+    prepared = None
+    for driver, infos, failure in selection.checked(selection.resolve(list(devices))):
+        if failure:
+            raise RunError(f"{driver.name}: {failure}")
+        folder = prepared.folder.folder if prepared else output
+        resumed = prepared is not None and prepared.folder.holds_rows
+        prepared = sweep(config, folder, axes=axes, resume=resumed, listener=listener)
+        worker.run(prepared, selection.Part(driver, infos), timeout_s)
     return load(prepared.folder.folder)
-
-
-def _run_elsewhere(
-    config: str | Path, output: str | Path | None, parts: Parts, axes: Sequence[str], *, quiet: bool
-) -> Path:
-    """Run a config on drivers that this process cannot see, each in its own; returns the folder."""
-    from freepath import config as configs
-    from freepath.compose import catalog
-    from freepath.device import drivers, selection
-    from freepath.results import folder as results
-
-    path = configs.find(str(config))
-    loaded = configs.load(path, catalog.load().parameter_models(), list(axes))
-    folder = ResultFolder(Path(output or results.new_folder(loaded.name)))
-    for driver, infos, failure in parts:
-        command = ["run", str(path), "-o", str(folder.folder), "--rows-only"]
-        command += [word for info in infos for word in ("-d", selection.selector_of(info))]
-        command += [word for axis in axes for word in ("-a", axis)]
-        command += ["--resume"] * folder.holds_rows
-        ended = None if failure else drivers.in_process_of(driver, command, capture=quiet)
-        if failure or ended.returncode:
-            why = failure or drivers.how_it_ended(driver, ended.returncode)
-            raise RunError("\n".join(filter(None, (why, ended and ended.stderr))))
-    return folder.folder
 
 
 def _say(row: dict[str, Any]) -> None:

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import os
 import signal
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from typing import Any
 
 import shtab
@@ -27,6 +26,7 @@ from freepath.commands import (
     source,
     trying,
 )
+from freepath.commands.common import let_go_of_output
 from freepath.errors import FAILED, INTERRUPTED, FreepathError
 
 COMMANDS = {
@@ -86,20 +86,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print("freepath: out of memory", file=sys.stderr)
         return FAILED
     except BrokenPipeError:
-        _let_go_of_output()  # the reader of a pipe has seen enough
+        let_go_of_output()  # the reader of a pipe has seen enough
         return 0
     except OSError as error:  # a full disk, of which standard output may be one
-        _let_go_of_output()
+        let_go_of_output()
         print(f"freepath: {error.filename or 'writing'}: {error.strerror}", file=sys.stderr)
         return FAILED
-
-
-def _let_go_of_output() -> None:
-    """Keep Python from complaining when it flushes at exit."""
-    with suppress(OSError, ValueError):
-        sys.stdout.flush()
-    with suppress(OSError, ValueError):
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def parser() -> argparse.ArgumentParser:

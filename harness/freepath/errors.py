@@ -108,6 +108,12 @@ class BuildError(FreepathError):
     exit_code = FAILED
 
 
+class ResultError(FreepathError):
+    """A folder of results that can no longer be written to while a run goes on."""
+
+    exit_code = FAILED
+
+
 class RunError(FreepathError):
     """A launch that failed on the device."""
 

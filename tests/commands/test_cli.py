@@ -303,15 +303,17 @@ def test_a_run_on_all_devices_has_rows_and_a_table_of_each(call, work):
 
 DIES = """\
 import os, sys
-words = sys.argv[1:]
-from freepath import cli
-from freepath.results.folder import ResultFolder
-append = ResultFolder.append
-def once(*given):
-    append(*given)
+from freepath.measure import worker
+from freepath.measure.sweep import Sweep
+groups = Sweep._groups
+Sweep._groups = lambda sweep, jobs: [[job] for group in groups(sweep, jobs) for job in group]
+run = Sweep._run
+def once(sweep, jobs):
+    run(sweep, jobs)
+    sweep.state[1] = -1
     os.abort()
-ResultFolder.append = once
-cli.main(words[3:])
+Sweep._run = once
+worker.main(sys.argv[4:])
 """
 
 
@@ -331,7 +333,7 @@ def test_what_a_driver_that_crashed_did_not_finish_is_told(call, work, monkeypat
     assert "mute: its process ended with exit code 1" in err
     assert "idle cannot be used here: it hangs" in err
     assert "mute: 2 of 2 cases were not finished on " in err
-    assert f"{dying.name}: its process was ended by SIGABRT" in err
+    assert f"{dying.name}: its process was ended by SIGABRT before a case was at work" in err
     assert f"{dying.name}: 1 of 2 cases were not finished on " in err
     (row,) = read_rows(work / "out" / "summary.csv")
     left = next(name for name in ("regular", "analytic") if name != row["tracker"])

@@ -143,14 +143,11 @@ class Interrupted(Sweep):
         super()._finish(job, row, rounds, *further)
 
 
-def test_an_interrupted_run_is_completed(go, work, monkeypatch):
-    monkeypatch.setattr(sweep, "Sweep", Interrupted)
-    code, printed = go()
-    assert code == 130
-    assert "interrupted with 1 of 4 cases done; go on with the same command" in printed.err
-    assert "-o out --resume" in printed.err
-    monkeypatch.undo()
-    monkeypatch.chdir(work)
+def test_an_interrupted_run_is_completed(go, work, device, monkeypatch):
+    (work / "small.yaml").write_text(SWEEP)
+    with monkeypatch.context() as patched, pytest.raises(KeyboardInterrupt):
+        patched.setattr(sweep, "Sweep", Interrupted)
+        api.sweep("small.yaml", "out", devices=[device]).run()
     first = (work / "out" / "summary.csv").read_bytes().splitlines()[1]
     assert [session["ended"] for session in facts()["sessions"]] == ["interrupted"]
     code, _ = go("--resume")

@@ -91,8 +91,8 @@ def test_a_process_is_waited_for_captured_and_given_up():
         drivers.in_process_of(made_up(), ["60"], module="timeit", capture=True, timeout=0.5)
     crash = made_up(prefix=(sys.executable, "-c", "import os; os.abort()"))
     code = drivers.in_process_of(crash, [], capture=True).returncode
-    assert drivers.how_it_ended(crash, code) == "made-up: its process was ended by SIGABRT"
-    assert drivers.how_it_ended(crash, 2) == "made-up: its process ended with exit code 2"
+    assert drivers.how_it_ended(code) == "its process was ended by SIGABRT"
+    assert drivers.how_it_ended(2) == "its process ended with exit code 2"
 
 
 WAITS = """

@@ -163,16 +163,16 @@ def test_a_row_of_another_hash_goes_with_its_rounds(tmp_path, column):
     assert samples_of(tmp_path) == [("b", "thing", "0"), ("b", "thing", "1")]
 
 
-@pytest.mark.parametrize("status", ["run_failed", "build_failed", "timeout"])
+@pytest.mark.parametrize("status", ["run_failed", "build_failed"])
 def test_a_row_that_failed_is_made_again(tmp_path, status):
     written(tmp_path, row_of("a", status=status))
     assert resumed(tmp_path, row_of("a"))[1] == set()
     assert read_rows(tmp_path / SUMMARY) == []
 
 
-def test_a_row_that_crashed_stands(tmp_path):
-    """Or two such cases would take turns in ending the process, for ever."""
-    written(tmp_path, row_of("a", status="crashed"))
+@pytest.mark.parametrize("status", ["crashed", "timeout"])
+def test_a_row_that_is_known_to_kill_stands(tmp_path, status):
+    written(tmp_path, row_of("a", status=status))
     assert resumed(tmp_path, row_of("a"))[1] == {key_of(row_of("a"))}
 
 

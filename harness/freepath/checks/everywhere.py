@@ -54,4 +54,5 @@ def run(
             if path.exists():
                 yield *read(path), code
             else:
-                yield {}, [drivers.how_it_ended(driver, code)], FAILED if code < 0 else code
+                why = f"{driver.name}: {drivers.how_it_ended(code)}"
+                yield {}, [why], FAILED if code < 0 else code

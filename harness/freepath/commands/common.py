@@ -7,6 +7,8 @@ import os
 import shutil
 import sys
 from argparse import Namespace
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -94,6 +96,23 @@ def console_of(*, stderr: bool = False, width: int = 160) -> Console:
     given = {"file": os.fdopen(os.dup(2), "w")} if apart else {"stderr": stderr}
     console = Plain(**given)
     return console if console.is_terminal else Plain(**given, width=width)
+
+
+def let_go_of_output() -> None:
+    """Go on where nobody reads what is printed, and keep Python from complaining at its end."""
+    with suppress(OSError, ValueError):
+        sys.stdout.flush()
+    with suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+@contextmanager
+def unread() -> Iterator[None]:
+    """Let the work go on whose reader has seen enough: its exit code must not say 0 too early."""
+    try:
+        yield
+    except BrokenPipeError:
+        let_go_of_output()
 
 
 def print_tables(console: Console, rows: list[dict[str, str]], load: float, baseline: str) -> None:

@@ -99,7 +99,7 @@ def execute(options: Namespace) -> int:
     from freepath.commands.common import console_of, own_folder, volume_of
     from freepath.commands.run import _shown_progress
     from freepath.compose import catalog
-    from freepath.device.selection import one_device
+    from freepath.device.selection import first
     from freepath.errors import RunError
     from freepath.extras.recommend import OVER, Search
     from freepath.extras.renderers import RENDERERS
@@ -110,7 +110,7 @@ def execute(options: Namespace) -> int:
     clock = Clock()
     medium = {"volume": volume_of(options.volume, options.sigma_t or 1.0, options.grid)}
     known = catalog.load(options.trackers)
-    device = one_device(options.device)
+    part = first(options.device)
     folder = options.output or new_folder(f"recommend-{options.volume.stem[:60]}")
     own_folder(folder, "recommend")
     console = console_of()
@@ -123,7 +123,7 @@ def execute(options: Namespace) -> int:
     interrupted = ""
     with _shown_progress(console, rows=False) as listener:
         renderer = RENDERERS.get(options.renderer)
-        search = Search(known, device, folder, *asked, listener, clock, options.include, renderer)
+        search = Search(known, part, folder, *asked, listener, clock, options.include, renderer)
         try:
             search.run()
         except KeyboardInterrupt:
@@ -133,7 +133,7 @@ def execute(options: Namespace) -> int:
     say(
         interrupted,
         f"{options.volume.name}, {options.estimand} to {100 * options.accuracy:g} %, on "
-        f"{device.info.label}",
+        f"{part.infos[0].label}",
         search.dense,
         DEFAULT if options.sigma_t is None else "",
     )

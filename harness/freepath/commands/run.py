@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 import re
 import sys
@@ -12,17 +11,21 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from freepath.commands.arguments import add_baseline, add_config, add_device, add_output
-from freepath.commands.common import cases_of, console_of, print_tables
-from freepath.errors import FAILED, INTERRUPTED, USAGE, UsageError
+from freepath.commands.arguments import (
+    add_baseline,
+    add_config,
+    add_device,
+    add_output,
+    positive,
+)
+from freepath.commands.common import cases_of, console_of, print_tables, unread
+from freepath.errors import FAILED, INTERRUPTED, RunError, UsageError
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from freepath.cases.plan import Case
-    from freepath.device.drivers import Driver
-    from freepath.device.opencl import DeviceInfo
-    from freepath.device.selection import Parts
+    from freepath.device.selection import Part
     from freepath.measure.sweep import Listener, Sweep
     from freepath.results.folder import ResultFolder
 
@@ -70,8 +73,13 @@ def add(commands: Any) -> None:
     run.add_argument("--repeat", type=int, default=1, metavar="N", help=told)
     run.add_argument("--json", action="store_true", help="print the rows as JSON, nothing else")
     add_baseline(run)
-    # given to the process of a driver: who started it shows the rows of all
-    run.add_argument("--rows-only", action="store_true", help=argparse.SUPPRESS)
+    run.add_argument(
+        "--timeout",
+        type=positive,
+        metavar="SECONDS",
+        help="give a case up whose build, or one of whose launches, takes longer, twice (default: "
+        "60 s and 20 times its at_most, on Oclgrind ten times that)",
+    )
 
 
 def execute(options: Namespace) -> int:
@@ -84,41 +92,51 @@ def execute(options: Namespace) -> int:
         raise UsageError(f"--baseline {options.baseline}: no case has a name that matches")
     from freepath import api
     from freepath.device import environment, selection
+    from freepath.measure import worker
     from freepath.measure.sweep import Clock
     from freepath.results import folder as results
 
     if options.repeat != 1:
         return _repeat(options, loaded.name)
-    load = environment.load()
+    load, clock = environment.load(), Clock(started)
     parts = selection.checked(selection.resolve(options.device))
-    if not selection.can_be_here(parts):
-        found = results.newest_folder if options.resume else results.new_folder
-        path = options.output or found(loaded.name)
-        folder = results.ResultFolder(path, resume=options.resume, confirm=options.confirm)
-        failed = _run_in_processes(options, parts, folder, cases)
-        shown = _show(options, folder, cases, load) if folder.holds_rows else 0
-        return max(shown, failed)
-    console = console_of(stderr=options.json)
-    sweep = api.sweep(
-        loaded,
-        options.output,
-        devices=selection.opened(parts),
-        known=known,
-        cases=cases,
-        resume=options.resume,
-        confirm=options.confirm,
-        clock=Clock(started),
-        work_group=options.work_group,
-    )
-    with _shown_progress(console) as sweep.listener:
+    found = results.newest_folder if options.resume else results.new_folder
+    path = options.output or found(loaded.name)
+    results.ResultFolder(path, resume=options.resume)  # refuses what it cannot write to
+    failed, sweep = 0, None
+    for number, part in enumerate(parts):
+        if part.failure:
+            told = f"{part.driver.name} cannot be used here: {part.failure}"
+            print(f"freepath: {told}", file=sys.stderr)
+            failed = FAILED
+            continue
+        if len(parts) > 1 and not options.json:
+            with unread():
+                print(f"{part.driver.name}: {part.driver.title}", flush=True)
+        resumed = options.resume or number > 0 and (path / results.SUMMARY).exists()
+        sweep = api.sweep(
+            loaded,
+            path,
+            known=known,
+            cases=cases,
+            resume=resumed,
+            confirm=options.confirm,
+            clock=clock,
+            work_group=options.work_group,
+        )
         try:
-            sweep.run()
+            with _shown_progress(console_of(stderr=options.json)) as sweep.listener:
+                worker.run(sweep, part, options.timeout)
         except KeyboardInterrupt:
             _say_how_to_resume(sweep)
             return INTERRUPTED
-    if options.rows_only:
-        return 0
-    return _show(options, sweep.folder, cases, load, sweep)
+        except RunError as error:
+            print(f"freepath: {error}", file=sys.stderr)
+            _say_what_is_missing(part, cases, sweep.folder)
+            failed = FAILED
+    if sweep is None or not sweep.folder.holds_rows:
+        return failed
+    return max(_show(options, sweep.folder, cases, load, sweep), failed)
 
 
 def _repeat(options: Namespace, name: str) -> int:
@@ -138,67 +156,24 @@ def _repeat(options: Namespace, name: str) -> int:
     return worst
 
 
-def _run_in_processes(
-    options: Namespace, parts: Parts, folder: ResultFolder, cases: list[Case]
-) -> int:
-    """Run each driver's devices in its process, one after the other, into one folder.
-
-    Returns the exit code: FAILED where one of them crashed or could not do what was wanted; the
-    others still run. What is wrong with the config or its files is said by the first, once.
-    """
-    from freepath.device import drivers, selection
-
-    failed = 0
-    for driver, infos, failure in parts:
-        if failure:
-            print(f"freepath: {driver.name} cannot be used here: {failure}", file=sys.stderr)
-            failed = FAILED
-            continue
-        arguments = ["run", options.config, "-o", str(folder.folder), "--rows-only"]
-        if options.resume or folder.holds_rows:
-            arguments.append("--resume")
-        arguments += ["--json"] * options.json + ["--confirm"] * options.confirm
-        selectors = [selection.selector_of(info) for info in infos]
-        if options.work_group is not None:
-            arguments += ["--work-group", str(options.work_group)]
-        for flag, values in (("-d", selectors), ("-a", options.axis), ("-R", [options.include])):
-            arguments += [word for value in values if value is not None for word in (flag, value)]
-        arguments += ["-E", options.exclude] * (options.exclude is not None)
-        arguments += [word for one in options.trackers for word in ("--trackers", str(one))]
-        if not options.json:
-            print(f"{driver.name}: {driver.title}")
-        code = drivers.in_process_of(driver, arguments).returncode
-        if code == INTERRUPTED:
-            raise KeyboardInterrupt
-        if code == USAGE:
-            return USAGE
-        if code != 0:
-            print(f"freepath: {drivers.how_it_ended(driver, code)}", file=sys.stderr)
-            _say_what_is_missing(driver, infos, cases, folder)
-            failed = FAILED
-    return failed
-
-
-def _say_what_is_missing(
-    driver: Driver, infos: list[DeviceInfo], cases: list[Case], folder: ResultFolder
-) -> None:
+def _say_what_is_missing(part: Part, cases: list[Case], folder: ResultFolder) -> None:
     """Which cases have no row of a driver whose process ended too early."""
     columns = ("case_id", "device", "platform", "driver_version")
     rows = folder.rows() if folder.holds_rows else []
     done = {tuple(row[column] for column in columns) for row in rows}
-    for info in infos:
+    for info in part.infos:
         place = (info.name, info.platform, info.driver_version)
         missing = [case.name for case in cases if (case.case_id, *place) not in done]
         if missing:
             names = ", ".join(missing[:NAMED]) + ", ..." * (len(missing) > NAMED)
             told = f"{len(missing)} of {len(cases)} cases were not finished on {info.label}"
-            print(f"freepath: {driver.name}: {told}: {names}", file=sys.stderr)
-    if not infos:
+            print(f"freepath: {part.driver.name}: {told}: {names}", file=sys.stderr)
+    if not part.infos:
         told = f"it showed no device, so that none of {len(cases)} cases was run"
-        print(f"freepath: {driver.name}: {told}", file=sys.stderr)
+        print(f"freepath: {part.driver.name}: {told}", file=sys.stderr)
     if rows:
         told = f"go on with the same command and -o {folder.folder} --resume"
-        print(f"freepath: {driver.name}: {told}", file=sys.stderr)
+        print(f"freepath: {part.driver.name}: {told}", file=sys.stderr)
 
 
 def _show(
@@ -206,27 +181,34 @@ def _show(
     folder: ResultFolder,
     cases: list[Case],
     load: float,
-    sweep: Sweep | None = None,
+    sweep: Sweep,
 ) -> int:
     """Print what the folder holds, and what failed; returns the exit code."""
     from freepath.results.folder import records
-    from freepath.show import table
 
     rows = _in_order(folder.rows(), cases)
-    if options.json:
-        print(json.dumps(records(rows), indent=1))
-        return _say_failures(rows)
+    with unread():
+        if options.json:
+            print(json.dumps(records(rows), indent=1), flush=True)
+        else:
+            _print(options, folder, rows, load, sweep)
+    return _say_failures(rows)
+
+
+def _print(
+    options: Namespace, folder: ResultFolder, rows: list[dict[str, str]], load: float, sweep: Sweep
+) -> None:
+    from freepath.show import table
+
     console = console_of(width=80)
     for told in folder.read_run().get("inputs") or ():
         console.print(told, highlight=False, markup=False, soft_wrap=True)
     print_tables(console, rows, load, options.baseline)
-    if sweep:
-        _print_times(console, sweep)
+    _print_times(console, sweep)
     if options.confirm:
         console.print(table.confirmed(folder.confirmed()), highlight=False)
     for written in folder.paths():
         console.print(f"wrote {written}", highlight=False, markup=False, soft_wrap=True)
-    return _say_failures(rows)
 
 
 @contextmanager
@@ -254,7 +236,8 @@ def _shown_progress(console: Console, *, rows: bool = True) -> Iterator[Listener
             def row(self, row: dict[str, Any]) -> None:
                 if rows and not console.is_terminal:
                     line = f"{row['status']:>8}  {row['case']}"
-                    console.print(line, highlight=False, markup=False, soft_wrap=True)
+                    with unread():
+                        console.print(line, highlight=False, markup=False, soft_wrap=True)
 
             def progress(self, done: float, total: int, what: str) -> None:
                 bar.update(task, completed=done, total=total, description=what)
@@ -265,7 +248,7 @@ def _shown_progress(console: Console, *, rows: bool = True) -> Iterator[Listener
 def _say_how_to_resume(sweep: Sweep) -> None:
     done = f"interrupted with {sweep.ended} of {sweep.total} cases done"
     path = sweep.folder.folder
-    if sweep.folder.is_open:
+    if sweep.folder.holds_rows:
         done += f"; go on with the same command and -o {path} --resume"
     print(f"freepath: {done}", file=sys.stderr)
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from freepath.checks.outcome import Outcome
     from freepath.compose.catalog import Catalog, Tracker
-    from freepath.device.opencl import Device
+    from freepath.device.selection import Part
 
 
 def add(commands: Any) -> None:
@@ -60,14 +60,14 @@ def add(commands: Any) -> None:
 def execute(options: Namespace) -> int:
     """Run it; returns the exit code."""
     from freepath.commands.common import console_of, own_folder, volume_of
-    from freepath.device.selection import one_device
+    from freepath.device.selection import first, one_device
     from freepath.extras import candidate
     from freepath.results.folder import new_folder
 
     known, tracker, parent = candidate.read(options.tracker, options.like)
     volume = volume_of(options.volume, options.sigma_t or 1.0) if options.volume else None
     path = options.output or new_folder(f"try-{tracker.name}")
-    device = one_device(options.device)
+    device, part = one_device(options.device), first(options.device)
     console = console_of()
     console.print(f"{tracker.title}, on {device.info.label}", highlight=False, markup=False)
     started = time.monotonic()
@@ -93,7 +93,7 @@ def execute(options: Namespace) -> int:
     others = {one.name: one for one in (parent, *candidate.relatives(known, tracker))}
     few = list(others.values())[: candidate.RELATIVES]
     config.write_text(candidate.sweep_text(tracker, few, volume), "utf-8")
-    return _measure(console, config, (known, tracker, parent), device)
+    return _measure(console, config, (known, tracker, parent), part)
 
 
 def _say_verdict(console: Console, outcomes: list[Outcome], kept: Path, stopped: str) -> bool:
@@ -122,19 +122,20 @@ def _say_verdict(console: Console, outcomes: list[Outcome], kept: Path, stopped:
 Trackers = tuple["Catalog", "Tracker", "Tracker"]
 
 
-def _measure(console: Console, config: Path, trackers: Trackers, device: Device) -> int:
+def _measure(console: Console, config: Path, trackers: Trackers, part: Part) -> int:
     """Measure it beside its relatives, write the report and say where it pays."""
     from freepath import api
     from freepath.commands.run import _shown_progress
     from freepath.extras import candidate
+    from freepath.measure import worker
     from freepath.show import report, table
     from freepath.show.report.text import sentences, summary
 
     known, tracker, parent = trackers
     with _shown_progress(console) as listener:
-        sweep = api.sweep(config, config.parent, known=known, devices=[device], listener=listener)
+        sweep = api.sweep(config, config.parent, known=known, listener=listener)
         try:
-            sweep.run()
+            worker.run(sweep, part)
         except KeyboardInterrupt:
             where = f"its folder is {config.parent}, which `freepath report` shows"
             console.print(f"interrupted with {sweep.ended} of {sweep.total} cases; {where}")

@@ -39,6 +39,11 @@ def told_first(log: str, source: str) -> str:
     return f"{error}{shown}\n{log}"
 
 
+def _itself(path: str, flags: int) -> int:
+    """Open a file, but none that a symbolic link leads to: a folder may be from somebody else."""
+    return os.open(path, flags | os.O_NOFOLLOW, 0o666)
+
+
 @contextmanager
 def compilers_into(log: Path | None) -> Iterator[None]:
     """Let what compilers and drivers print while they build go into a file, or nowhere.
@@ -47,7 +52,7 @@ def compilers_into(log: Path | None) -> Iterator[None]:
     """
     sys.stderr.flush()
     before = os.dup(2)
-    with log.open("a+b") if log else tempfile.TemporaryFile() as printed:
+    with open(log, "a+b", opener=_itself) if log else tempfile.TemporaryFile() as printed:
         start = printed.seek(0, os.SEEK_END)
         try:
             os.dup2(printed.fileno(), 2)

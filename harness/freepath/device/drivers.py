@@ -14,9 +14,11 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib import metadata
 from pathlib import Path
+from typing import Any
 
 from freepath.device.icd import in_icd_files, in_package, strangers
 
@@ -210,6 +212,34 @@ def _become(environment: Mapping[str, str]) -> None:
     os.environ.update(environment)
 
 
+@contextmanager
+def started(
+    driver: Driver, words: Sequence[str], **options: Any
+) -> Iterator[subprocess.Popen[str]]:
+    """Start a module of Python with its arguments where only this driver is seen.
+
+    With options of subprocess.Popen. It is killed where it is left before it ends.
+    """
+    command = [*driver.prefix, sys.executable, "-m", *words]
+    sys.stdout.flush()
+    with (
+        tempfile.TemporaryDirectory(prefix="freepath-") as folder,
+        subprocess.Popen(
+            command,
+            env=environment_of(driver, Path(folder)),
+            # Ctrl-C of a terminal would reach it twice: from there, and from here
+            start_new_session=True,
+            **options,
+        ) as process,
+    ):
+        try:
+            yield process
+        finally:
+            if process.poll() is None:
+                # with what it has started: a command in front of Python ends later than Python
+                os.killpg(process.pid, signal.SIGKILL)
+
+
 def in_process_of(
     driver: Driver,
     arguments: Sequence[str],
@@ -224,44 +254,26 @@ def in_process_of(
     process is handed on, and waits until the other has left everything in order. Raises
     subprocess.TimeoutExpired after that many seconds.
     """
-    command = [*driver.prefix, sys.executable, "-m", module, *arguments]
     streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE} if capture else {}
-    sys.stdout.flush()
-    with (
-        tempfile.TemporaryDirectory(prefix="freepath-") as folder,
-        subprocess.Popen(
-            command,
-            env=environment_of(driver, Path(folder)),
-            text=True,
-            errors="replace",
-            # Ctrl-C of a terminal would reach it twice: from there, and from here
-            start_new_session=True,
-            **streams,
-        ) as process,
-    ):
+    with started(driver, [module, *arguments], text=True, errors="replace", **streams) as process:
         try:
             out, err = process.communicate(timeout=timeout)
         except KeyboardInterrupt:
             process.terminate()
             process.communicate()
             raise
-        except BaseException:
-            # with what it has started: a command in front of Python ends later than Python
-            os.killpg(process.pid, signal.SIGKILL)
-            process.communicate()
-            raise
-    return subprocess.CompletedProcess(command, process.returncode, out, err)
+    return subprocess.CompletedProcess(process.args, process.returncode, out, err)
 
 
-def how_it_ended(driver: Driver, code: int) -> str:
-    """What to say of a driver's process that failed; a crash of the driver ends it by a signal."""
+def how_it_ended(code: int) -> str:
+    """What to say of a process that failed; a crash of the driver ends it by a signal."""
     if code >= 0:
-        return f"{driver.name}: its process ended with exit code {code}"
+        return f"its process ended with exit code {code}"
     try:
         name = signal.Signals(-code).name
     except ValueError:
         name = f"signal {-code}"
-    return f"{driver.name}: its process was ended by {name}"
+    return f"its process was ended by {name}"
 
 
 class Complaints:

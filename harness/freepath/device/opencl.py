@@ -163,6 +163,8 @@ class Device:
         """Where to keep what compilers print."""
         self.work_group: int | None = None
         """The local size that the user wants."""
+        self.state = np.zeros(1)
+        """Since when a build or a launch goes on, by the monotonic clock; 0 where none does."""
         self.cl_device = device
         self._complaints = drivers.Complaints()
         cpu_name.mend(info.driver_version, device.int_ptr)
@@ -219,13 +221,22 @@ class Device:
         with run_errors(self.info.label, f"writing {array.nbytes} bytes"):
             cl.enqueue_copy(self.queue, buffer, array)
 
+    @contextmanager
+    def at_work(self) -> Iterator[None]:
+        """Let who watches this process know that the driver has it."""
+        self.state[0] = time.monotonic()
+        try:
+            yield
+        finally:
+            self.state[0] = 0.0
+
     def build(self, source: Source) -> Program:
         """Compile; raises BuildError with the compiler's log."""
         started = time.perf_counter()
         if self.info.interpreted:
             source = Source(source.text, (*source.options, *INTERPRETED))
         try:
-            with warnings.catch_warnings(), compilers_into(self.compiler_log):
+            with warnings.catch_warnings(), compilers_into(self.compiler_log), self.at_work():
                 warnings.simplefilter("ignore", cl.CompilerWarning)
                 program = cl.Program(self.context, source.text).build(options=list(source.options))
                 kernel = cl.Kernel(program, "track")
@@ -294,8 +305,9 @@ class Program:
         size = (global_size,), (local_size,)
         with run_errors(self.device.info.label, "a launch"), self._first_is_quiet(size):
             self._kernel.set_args(*arguments)
-            event = cl.enqueue_nd_range_kernel(self.device.queue, self._kernel, *size)
-            event.wait()
+            with self.device.at_work():
+                event = cl.enqueue_nd_range_kernel(self.device.queue, self._kernel, *size)
+                event.wait()
         self.device.check_complaints()
         if self.device.info.timing_source == "wall":
             return 0.0  # rusticl 22.3 has no timer and may report a nanosecond

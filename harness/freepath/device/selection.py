@@ -147,12 +147,17 @@ def opened(parts: Parts) -> list[Device]:
         raise RunError(f"{parts[0].driver.name}: {error}; {hint}") from error
 
 
-def one_device(selectors: Sequence[str]) -> Device:
-    """The first device that -d means, in this process; raises DeviceError where that cannot be."""
+def first(selectors: Sequence[str]) -> Part:
+    """The driver of the first device that -d means, and that device; raises DeviceError."""
     part = resolve(selectors)[0]
-    part = part._replace(infos=part.infos[:1])
     if not part.infos:
         raise DeviceError(f"{part.driver.name} cannot be used here: {part.failure or 'no device'}")
+    return part._replace(infos=part.infos[:1])
+
+
+def one_device(selectors: Sequence[str]) -> Device:
+    """The first device that -d means, in this process; raises DeviceError where that cannot be."""
+    part = first(selectors)
     if not can_be_here([part]):
         seen = drivers.current()
         why = f"this process uses {seen.name}" if seen else "it needs a command in front of Python"

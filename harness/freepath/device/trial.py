@@ -108,7 +108,7 @@ def _tried(driver: Driver) -> Outcome:
         )
         out, said = ended.stdout, ended.stderr
         if ended.returncode:
-            why = drivers.how_it_ended(driver, ended.returncode).partition(": ")[2]
+            why = drivers.how_it_ended(ended.returncode)
     except drivers.TimeoutExpired as error:
         out, said = (
             (text or b"").decode("utf-8", "replace") for text in (error.stdout, error.stderr)

@@ -16,9 +16,10 @@ import numpy as np
 from freepath import api
 from freepath.cases import plan
 from freepath.compose.catalog import ANY, Catalog
-from freepath.device.opencl import Device
+from freepath.device.selection import Part
 from freepath.errors import NothingMatchedError, RunError
 from freepath.extras.renderers import RATES, Renderer, contains
+from freepath.measure import worker
 from freepath.measure.jobs import scenes_of
 from freepath.measure.ladder import Ladder
 from freepath.measure.sweep import Clock, Listener, Sweep
@@ -77,7 +78,8 @@ class Search:
     """Rounds of sweeps in one volume, each of fewer cases that are measured longer."""
 
     known: Catalog
-    device: Device
+    part: Part
+    """A driver with one device."""
     folder: Path
     medium: Axes
     """The volume as a config has it."""
@@ -261,13 +263,12 @@ class Search:
             config,
             config.with_suffix(""),
             known=self.known,
-            devices=[self.device],
             listener=self.listener,
             clock=self.clock,
         )
         self.dense = self.dense or self._density(sweep)
         try:
-            sweep.run()
+            worker.run(sweep, self.part)
         finally:
             rows = self._note_all(sweep)
             took = self.clock.outside_s - before

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import re
+import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -225,13 +226,16 @@ def exposed(mean: np.ndarray, exposure: float | None = None) -> tuple[np.ndarray
 
 @contextmanager
 def _replaced(base: Path, suffix: str) -> Iterator[Path]:
-    """Write beside, and replace in one step what was there; leave nothing of what failed."""
-    path = base.with_name(f"{base.name}.part{suffix}")
-    try:
-        yield path
-        os.replace(path, base.with_name(base.name + suffix))
-    finally:
-        path.unlink(missing_ok=True)
+    """Write beside, and replace in one step what was there; leave nothing of what failed.
+
+    Raises FreepathError where a folder is a symbolic link: it leads to what is not the run's.
+    """
+    for link in base.parents[:2]:
+        if link.name in EQUAL_TIME.split("/") and link.is_symlink():
+            raise FreepathError(f"{link} is a symbolic link")
+    with tempfile.TemporaryDirectory(dir=base.parent, prefix=".") as folder:
+        yield Path(folder) / f"picture{suffix}"
+        os.replace(Path(folder) / f"picture{suffix}", base.with_name(base.name + suffix))
 
 
 def _check(succeeded: Any, image: Any) -> None:

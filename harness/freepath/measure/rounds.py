@@ -211,7 +211,7 @@ class Bench:
 def interleave(
     benches: Iterable[Bench],
     seed: int,
-    on_error: Callable[[Bench, RunError], None],
+    on_error: Callable[[Bench, RunError | MemoryError], None],
     on_turn: Callable[[Bench], None] = lambda bench: None,
 ) -> Iterator[Bench]:
     """Run rounds of all cases in random order, anew in each pass; yields the bench of each round.
@@ -227,7 +227,7 @@ def interleave(
             on_turn(bench)
             try:
                 bench.step()
-            except RunError as error:
+            except (RunError, MemoryError) as error:
                 bench.measurement.stopped = "failed"
                 on_error(bench, error)
             else:

@@ -8,6 +8,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from freepath.cases.plan import Case
 from freepath.compose.catalog import Catalog
 from freepath.compose.source import Source
@@ -26,13 +28,9 @@ from freepath.measure.row import measured_row, round_rows
 from freepath.measure.runner import KernelData
 from freepath.measure.stopping import Rule
 from freepath.results.folder import ResultFolder
-from freepath.results.journal import TWICE
 
-CRASHED = {
-    "status": "crashed",
-    "reason": f"the process ended {TWICE} times while this case was built or run; "
-    "a run into another folder tries it again",
-}
+TWICE = 2
+"""So often a process may end at a case before that is given up: once may have been an accident."""
 
 
 @dataclass
@@ -86,8 +84,13 @@ class Sweep:
     run_id: str = field(default_factory=lambda: uuid.uuid4().hex[:12])
     total: int = 0
     ended: int = 0
+    deaths: dict[int, list[dict[str, str]]] = field(default_factory=dict)
+    """By the number of a job: how a process ended at it, as its row would say."""
+    state: np.ndarray = field(default_factory=lambda: np.array([0.0, -1.0]))
+    """Since when the driver is at work, as of a device, and the number of the job at work."""
     _shots: list[equal_time.Shot] = field(default_factory=list)
     """Cases of the scene at work that were measured, where they get pictures."""
+    _numbers: dict[Job, int] = field(default_factory=dict)
     _programs: dict[tuple[str, str], Program | BuildError] = field(default_factory=dict)
 
     def run(self) -> None:
@@ -98,9 +101,10 @@ class Sweep:
         """
         for device in self.devices:
             device.group_by(self.work_group)
+            device.state = self.state
         if self.config.render:
             openimageio()  # or the pictures would be missed only when all is measured
-        self.total = len(self.cases) * len(self.devices)
+        self.total = self.total if self.deaths else len(self.cases) * len(self.devices)
         self._progress(0.0, "preparing scenes")
         scenes = scenes_of(self.cases, self.config.search_path)
         jobs = [
@@ -108,9 +112,12 @@ class Sweep:
             for device in self.devices
             for case in self.cases
         ]
-        done = self.folder.open([job.row for job in jobs], self._is_whole)
+        self._numbers = {job: number for number, job in enumerate(jobs)}
+        done = self.folder.open([job.row for job in jobs], self._is_whole, self.run_id)
         left = [job for job in jobs if job.key not in done]
-        self.total = len(left)
+        # of a process that goes on where another one ended, those are left which that had left
+        self.total = self.total if self.deaths else len(left)
+        self.ended = self.total - len(left)
         if not left:
             self.folder.close()
             return
@@ -157,16 +164,21 @@ class Sweep:
         """`under_way` is how many cases' worth of those at work is done."""
         self.listener.progress(self.ended + under_way, self.total, what)
 
-    def _deaths_at(self, job: Job) -> int:
-        """How often the process of this run ended while this case was at work."""
-        return self.folder.journal.deaths_at(job.key)
+    def _deaths_at(self, job: Job) -> list[dict[str, str]]:
+        """How a process of this run ended, each time one did while this case was at work."""
+        return self.deaths.get(self._numbers[job], [])
+
+    def _work_at(self, job: Job) -> None:
+        self.state[1] = self._numbers[job]
 
     def _run(self, jobs: list[Job]) -> None:
         """Build and measure jobs side by side; each row is written as it ends."""
         ready = []
         for job in jobs:
-            if self._deaths_at(job) >= TWICE:
-                self._finish(job, job.row | CRASHED)
+            if len(self._deaths_at(job)) >= TWICE:
+                *_, last = self._deaths_at(job)
+                reason = f"{last['reason']}, also when it was tried again alone"
+                self._finish(job, job.row | last | {"reason": reason})
             elif job.timed is None:
                 self._finish(job, job.row)
             else:
@@ -174,10 +186,10 @@ class Sweep:
         data: dict[tuple[str, str], KernelData] = {}
         for place, job in enumerate(ready, 1):
             self._progress(0.0, f"building {place}/{len(ready)}")
-            self.folder.journal.work_at(job.key)
+            self._work_at(job)
             try:
                 self._prepare(job, data)
-            except (BuildError, RunError) as error:
+            except (BuildError, RunError, MemoryError) as error:
                 self._fail(job, error)
         self._measure([job for job in ready if job.bench])
 
@@ -232,13 +244,17 @@ class Sweep:
         self._progress(0.0, "computing references")
         for job in jobs:
             # now, and not between two rounds
-            job.scene.reference(job.case)
-            job.scene.as_stored(job.case).reference(job.case)
+            self._work_at(job)
+            try:
+                job.scene.reference(job.case)
+                job.scene.as_stored(job.case).reference(job.case)
+            except MemoryError as error:
+                self._fail(by_bench.pop(job.bench), error)
 
         def on_turn(bench: Bench) -> None:
-            self.folder.journal.work_at(by_bench[bench].key)
+            self._work_at(by_bench[bench])
 
-        def on_error(bench: Bench, error: RunError) -> None:
+        def on_error(bench: Bench, error: RunError | MemoryError) -> None:
             self._fail(by_bench[bench], error)
 
         for bench in interleave(by_bench, self.config.seed, on_error, on_turn):
@@ -282,8 +298,10 @@ class Sweep:
             self.clock.device_s += found.time_device_s - row["time_device_s"]
         return self._finish(job, row, round_rows(row, found), confirmed)
 
-    def _fail(self, job: Job, error: FreepathError) -> None:
+    def _fail(self, job: Job, error: FreepathError | MemoryError) -> None:
         """A case that cannot be built or run is a row; the others go on."""
+        if isinstance(error, MemoryError):
+            error = RunError(f"out of memory: {error}")
         status = "build_failed" if isinstance(error, BuildError) else "run_failed"
         if isinstance(error, DriverLimitError):
             status = "skipped"

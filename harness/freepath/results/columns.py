@@ -31,10 +31,10 @@ schema_version int - of all files of a run
 run_id str - which run wrote the row
 case_id str - 12 hexadecimal digits for what is measured, however long
 case str - the name of the case
-status str - `ok`, `skipped`, `invalid` (not finite), `build_failed`, `run_failed`, `crashed` ([its
-    process ended twice](devices.md)), `mismatch` (claims to be unbiased and is beyond 6 standard
-    errors of the reference and what the arithmetic rounds; of voxels stored in half, of the
-    reference of the rounded ones)
+status str - `ok`, `skipped`, `invalid` (not finite), `build_failed`, `run_failed`, `timeout`
+    and `crashed` ([its process hung or ended twice](sweeps.md)), `mismatch` (claims to be unbiased
+    and is beyond 6 standard errors of the reference and what the arithmetic rounds; of voxels
+    stored in half, of the reference of the rounded ones)
 reason str - why the status is not `ok`; with `ok` a remark, such as paths at the step cap or the
     share of lookups above the majorant
 device str - its name

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import csv
 import datetime
+import errno
 import json
 import math
 import os
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import tempfile
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from freepath.errors import FreepathError
+from freepath.errors import FreepathError, ResultError
 from freepath.results import reading
 from freepath.results.columns import COLUMNS, CONFIRM_COLUMNS, SAMPLE_COLUMNS, TEXTS
-from freepath.results.journal import Journal
 
 SCHEMA_VERSION = 5
 SUMMARY, SAMPLES, CONFIRM, RUN = "summary.csv", "samples.csv", "confirm.csv", "run.json"
@@ -30,8 +32,11 @@ KEY = (*PLACE, "driver_version", "config_sha256", "source_sha256")
 """A row of an interrupted run stands if all of these are what they would be now."""
 SESSION = (*PLACE, "run_id")
 """What the rows of a case's rounds have in common with its own row."""
-FINAL = ("ok", "skipped", "invalid", "mismatch", "crashed")
+FINAL = ("ok", "skipped", "invalid", "mismatch", "crashed", "timeout")
 """Statuses that running again would only repeat."""
+
+UMASK = os.umask(0o077)
+os.umask(UMASK)
 
 Row = reading.Row
 
@@ -49,7 +54,7 @@ class ResultFolder:
         self._resume = resume
         self._confirm = confirm
         self._lock: Any = None
-        self.journal = Journal(folder)
+        self._locked = 0
         try:
             if folder.exists() and not folder.is_dir():
                 raise FreepathError(f"{folder}: is a file, expected a folder for the results")
@@ -65,25 +70,28 @@ class ResultFolder:
             )
 
     def open(
-        self, planned: Sequence[Mapping[str, Any]], whole: Callable[[Row], bool] = lambda row: True
+        self,
+        planned: Sequence[Mapping[str, Any]],
+        whole: Callable[[Row], bool] = lambda row: True,
+        run_id: str = "",
     ) -> set[tuple[str, ...]]:
         """Make the folder, or take it over: rows that stand stay, rows to be made anew go.
 
         `planned` holds at least the KEY columns of every row that is wanted; returns the keys of
-        those that are there already. Rows of other cases and devices are left alone. `whole` says
+        those that are there already. Rows of other cases and devices are left alone, and those of
+        the run `run_id` stand whatever became of their cases. `whole` says
         whether all files of a row are there; without them it does not stand.
         """
         wanted, places = {key_of(row) for row in planned}, {_of(row, PLACE) for row in planned}
 
         def stands(row: Row) -> bool:
             confirmed = needed is None or row["status"] != "ok" or _of(row, SESSION) in needed
-            final = row["status"] in FINAL and confirmed
+            final = (row["status"] in FINAL or row["run_id"] == run_id) and confirmed
             return key_of(row) in wanted and final and whole(row)
 
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
             self._acquire()
-            self.journal.open()
             old = self.rows() if self._resume else []
             predicted = self._old(CONFIRM, CONFIRM_COLUMNS)
             needed = {_of(row, SESSION) for row in predicted} if self._confirm else None
@@ -105,16 +113,24 @@ class ResultFolder:
         """Keep others from writing here; the system lets go of the lock when the process ends."""
         import filelock
 
-        self._lock = filelock.FileLock(self.folder / LOCK)
+        path = self.folder / LOCK
+        if path.is_symlink():
+            raise FreepathError(f"{path}: is a symbolic link, which no run makes; remove it")
+        self._lock = filelock.FileLock(path)
         try:
             self._lock.acquire(timeout=0)
         except filelock.Timeout:
             raise FreepathError(f"{self.folder}: another freepath is writing there") from None
+        self._locked = path.stat().st_ino
 
-    @property
-    def is_open(self) -> bool:
-        """Whether the folder holds this run, so that it can be gone on with."""
-        return self._lock is not None
+    def _check_lock(self) -> None:
+        """Raise ResultError where the lock was removed, as another run may write here then."""
+        path = self.folder / LOCK
+        try:
+            if self._lock and path.stat().st_ino != self._locked:
+                raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT))
+        except OSError as error:
+            raise _stopped(path, error) from error
 
     @property
     def holds_rows(self) -> bool:
@@ -124,9 +140,9 @@ class ResultFolder:
     def close(self) -> None:
         """Let others write here."""
         if self._lock:
-            self.journal.close()
             (self.folder / LOCK).unlink(missing_ok=True)
             self._lock.release()
+            self._lock = None
 
     def _old(self, name: str, columns: tuple[str, ...]) -> list[Row]:
         """The rows of a file of the run that is gone on with."""
@@ -135,12 +151,9 @@ class ResultFolder:
 
     def _rewrite(self, name: str, columns: tuple[str, ...], rows: list[Row]) -> None:
         """Replace a file in one step, so that an interruption leaves the old or the new one."""
-        temporary = self.folder / f"{name}.part"
-        with temporary.open("w", newline="", encoding="utf-8") as file:
+        with replacing(self.folder / name) as file:
             _writer(file, columns).writeheader()
             _writer(file, columns).writerows(rows)
-            _flush(file)
-        os.replace(temporary, self.folder / name)
 
     def append(
         self,
@@ -149,30 +162,35 @@ class ResultFolder:
         confirmed: Iterable[Mapping[str, Any]] = (),
     ) -> None:
         """Write a case's row and, before it, those of its rounds; both are on the disk then."""
+        self._check_lock()
         self._append(SAMPLES, SAMPLE_COLUMNS, rounds)
         if self._confirm:
             self._append(CONFIRM, CONFIRM_COLUMNS, confirmed)
         self._append(SUMMARY, COLUMNS, [row])
-        self.journal.done(_of(row, PLACE))
 
     def _append(self, name: str, columns: tuple[str, ...], rows: Iterable[Mapping]) -> None:
         texts = [{column: _text(row[column]) for column in columns} for row in rows]
+        flags = os.O_WRONLY | os.O_APPEND | os.O_NOFOLLOW  # one that was removed is not made anew
         try:
-            with (self.folder / name).open("a", newline="", encoding="utf-8") as file:
+            with open(
+                self.folder / name,
+                "a",
+                newline="",
+                encoding="utf-8",
+                opener=lambda path, _: os.open(path, flags),
+            ) as file:
                 _writer(file, columns).writerows(texts)
                 _flush(file)
         except OSError as error:
-            raise FreepathError(f"{self.folder / name}: {error.strerror}") from error
+            raise _stopped(self.folder / name, error) from error
 
     def write_run(self, facts: Mapping[str, Any]) -> None:
         """Write run.json."""
-        temporary = self.folder / f"{RUN}.part"
-        text = json.dumps(facts, indent=1, allow_nan=False) + "\n"
         try:
-            temporary.write_text(text, encoding="utf-8")
-            os.replace(temporary, self.folder / RUN)
+            with replacing(self.folder / RUN) as file:
+                file.write(json.dumps(facts, indent=1, allow_nan=False) + "\n")
         except OSError as error:
-            raise FreepathError(f"{self.folder / RUN}: {error.strerror}") from error
+            raise _stopped(self.folder / RUN, error) from error
 
     def read_run(self) -> dict[str, Any]:
         """What run.json says; empty where there is none that can be read."""
@@ -183,9 +201,9 @@ class ResultFolder:
 
     def write_log(self, name: str, text: str) -> Path:
         """Write a compiler's log beside the rows."""
-        path = self.folder / name
-        path.write_text(text, encoding="utf-8")
-        return path
+        with replacing(self.folder / name) as file:
+            file.write(text)
+        return self.folder / name
 
     def rows(self) -> list[Row]:
         """All rows so far, as they stand in the file."""
@@ -219,6 +237,33 @@ def newest_folder(name: str) -> Path:
 
 def _writer(file: Any, columns: tuple[str, ...]) -> csv.DictWriter:
     return csv.DictWriter(file, columns, lineterminator="\n")
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Any]:
+    """A file to write text into that takes the place of `path` in one step, once all is written.
+
+    A symbolic link there is replaced, and never followed: a folder may come from somebody else.
+    """
+    with tempfile.NamedTemporaryFile(
+        "w", dir=path.parent, prefix=".", encoding="utf-8", newline="", delete=False
+    ) as file:
+        try:
+            os.fchmod(file.fileno(), 0o666 & ~UMASK)
+            yield file
+            _flush(file)
+            os.replace(file.name, path)
+        except BaseException:
+            os.unlink(file.name)
+            raise
+
+
+def _stopped(path: Path, error: OSError) -> ResultError:
+    why = error.strerror
+    if isinstance(error, FileNotFoundError):
+        why = "was removed while a run writes there"
+    hint = "rows that were finished stand; go on by --resume"
+    return ResultError(f"{path}: {why}; {hint}")
 
 
 def _flush(file: Any) -> None:

@@ -40,8 +40,10 @@ def write(
     or a chart has nothing to show.
     """
     report, data, chosen = made(results, output, wanted, chart, baseline)
-    output = output or results[0] / f"report.{chosen}"
+    own, output = output is None, output or results[0] / f"report.{chosen}"
     try:
+        if own and output.is_symlink():
+            output.unlink()  # a folder may be from somebody else: what it points to is not ours
         output.write_bytes(data)
     except OSError as error:
         raise FreepathError(f"cannot write {output}: {error.strerror}") from error
