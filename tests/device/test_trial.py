@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from freepath import paths
 from freepath.device import cpu_name, drivers, trial
 from freepath.device.trial import Outcome, outcomes
 from support.made_up import made_up
@@ -192,7 +193,7 @@ def test_a_driver_that_builds_nothing_is_named_by_every_command(planted, tmp_pat
     import numpy as np
 
     np.save(tmp_path / "cloud.npy", np.ones((4, 4, 4), np.float32))
-    mine = (Path(drivers.__file__).parents[1] / "kernels/trackers/delta.cl").read_text("utf-8")
+    mine = (paths.KERNELS / "trackers/delta.cl").read_text("utf-8")
     (tmp_path / "mine.cl").write_text(mine)
     cause = "its process was ended by SIGABRT" if name == "crash" else "unknown target CPU 'znver9'"
     code, out, _ = planted(name, "devices", "--json")

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from freepath import cli
+from freepath import api, cli
 from freepath.compose.source import Source
 from freepath.device.opencl import cl, open_devices
 from freepath.errors import DeviceError, DriverLimitError, RunError
@@ -203,11 +203,14 @@ def test_a_run_in_groups(work, selector, capsys):
     assert "--work-group 1000000: " in capsys.readouterr().err
 
 
-def test_a_run_where_it_is_chosen(work, selector, monkeypatch):
+def test_a_run_where_it_is_chosen(work, another, monkeypatch):
     """A CPU that is taken for a GPU: the row has one of the geometries that were tried."""
     (work / "small.yaml").write_text(CONFIG)
     monkeypatch.setattr(geometry, "is_open", lambda info: True)
-    assert cli.main(["run", "small.yaml", "-d", selector, "-o", "out"]) == 0
+    sweep = api.sweep("small.yaml", "out")
+    sweep.devices = [another]
+    sweep.run()
     rows = read_rows(work / "out" / "summary.csv")
+    assert rows
     assert all(int(row["work_group"]) >= 32 for row in rows)
     assert all(int(row["work_items"]) % int(row["work_group"]) == 0 for row in rows)
