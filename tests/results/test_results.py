@@ -233,7 +233,7 @@ def test_a_missing_line_end_does_not_join_rows(tmp_path):
 
 def test_files_of_another_version_are_refused(tmp_path):
     (tmp_path / SUMMARY).write_text("a,b\n1,2\n")
-    with pytest.raises(FreepathError, match="its columns are not those of schema version 5"):
+    with pytest.raises(FreepathError, match="its columns are not those of schema version 6"):
         resumed(tmp_path)
 
 
@@ -319,7 +319,7 @@ DAMAGES = [
         f"summary.csv:2: expected {len(COLUMNS)} cells, as the first line has, got fewer",
     ),
     (SUMMARY, ",thing,", ",\x1b]0;x\x07,", "summary.csv:2: column 7, device: holds a control"),
-    (SUMMARY, ",none,", ",grid-8,", "summary.csv:2: column 16, tightness: expected a number, as"),
+    (SUMMARY, ",none,", ",grid-8,", "summary.csv:2: column 17, tightness: expected a number, as"),
     (SUMMARY, "/a/auto/strict", "", "summary.csv:2: column 4, case: expected estimand/medium/"),
     (SUMMARY, ",ok,", ",fine,", "summary.csv:2: column 5, status: expected one of ok, skipped"),
     (SUMMARY, ",2,", ",3,", "summary.csv:2: transmittance/m/a/auto/strict: expected 3 rounds of"),
@@ -369,5 +369,5 @@ def test_a_damaged_run_json_is_refused(tmp_path, capsys, text):
 
 def test_an_empty_summary_is_refused(tmp_path):
     (tmp_path / SUMMARY).write_text("")
-    with pytest.raises(FreepathError, match="its columns are not those of schema version 5"):
+    with pytest.raises(FreepathError, match="its columns are not those of schema version 6"):
         resumed(tmp_path)

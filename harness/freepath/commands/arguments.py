@@ -106,3 +106,12 @@ def positive(text: str) -> float:
     if not 0.0 < value < 1e30:
         raise argparse.ArgumentTypeError(f"expected a number above 0, got '{text}'")
     return value
+
+
+def shard(text: str) -> tuple[int, int]:
+    """I/N, the I-th of N parts, as the type of an argument."""
+    number, _, count = text.partition("/")
+    if not (number.isdecimal() and count.isdecimal() and 1 <= int(number) <= int(count)):
+        expected = "expected I/N with I from 1 to N, such as 2/8"
+        raise argparse.ArgumentTypeError(f"{expected}, got '{text}'")
+    return int(number), int(count)

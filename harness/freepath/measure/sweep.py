@@ -81,6 +81,8 @@ class Sweep:
     """Whether the error that each case predicts is measured as well."""
     work_group: int | None = None
     """Work-items of a group; None for what is best known or found."""
+    shard: tuple[int, int] | None = None
+    """Which of how many parts of all cases these are; None for all."""
     run_id: str = field(default_factory=lambda: uuid.uuid4().hex[:12])
     total: int = 0
     ended: int = 0
@@ -124,6 +126,7 @@ class Sweep:
         facts = run_file.facts_of(self.config, self.devices, jobs)
         facts["inputs"] = inputs_of(scenes)
         session = run_file.session_of(self.run_id, self.devices, self.total)
+        session |= {"shard": "{}/{}".format(*self.shard)} if self.shard else {}
         ended = "failed"
         try:
             run_file.write(self.folder, facts, session | {"ended": "running, or killed"})

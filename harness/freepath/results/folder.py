@@ -19,7 +19,7 @@ from freepath.errors import FreepathError, ResultError
 from freepath.results import reading
 from freepath.results.columns import COLUMNS, CONFIRM_COLUMNS, SAMPLE_COLUMNS, TEXTS
 
-SCHEMA_VERSION = 5
+SCHEMA_VERSION = 6
 SUMMARY, SAMPLES, CONFIRM, RUN = "summary.csv", "samples.csv", "confirm.csv", "run.json"
 CHECKS = "checks.json"
 """What became of the checks of a tracker on trial."""
@@ -99,12 +99,12 @@ class ResultFolder:
             sessions = {_of(row, SESSION) for row in kept}
             rounds = self._old(SAMPLES, SAMPLE_COLUMNS)
             reading.agree(self.folder / SUMMARY, old, rounds, SESSION)
-            self._rewrite(SUMMARY, COLUMNS, kept)
+            self.rewrite(SUMMARY, COLUMNS, kept)
             rounds = [row for row in rounds if _of(row, SESSION) in sessions]
-            self._rewrite(SAMPLES, SAMPLE_COLUMNS, rounds)
+            self.rewrite(SAMPLES, SAMPLE_COLUMNS, rounds)
             if predicted or self._confirm:
                 stay = [row for row in predicted if _of(row, SESSION) in sessions]
-                self._rewrite(CONFIRM, CONFIRM_COLUMNS, stay)
+                self.rewrite(CONFIRM, CONFIRM_COLUMNS, stay)
         except OSError as error:
             raise FreepathError(f"{self.folder}: cannot be written to: {error.strerror}") from error
         return {key_of(row) for row in kept if stands(row)}
@@ -149,7 +149,7 @@ class ResultFolder:
         path = self.folder / name
         return read_rows(path, columns) if self._resume and path.exists() else []
 
-    def _rewrite(self, name: str, columns: tuple[str, ...], rows: list[Row]) -> None:
+    def rewrite(self, name: str, columns: tuple[str, ...], rows: list[Row]) -> None:
         """Replace a file in one step, so that an interruption leaves the old or the new one."""
         with replacing(self.folder / name) as file:
             _writer(file, columns).writeheader()
@@ -240,13 +240,14 @@ def _writer(file: Any, columns: tuple[str, ...]) -> csv.DictWriter:
 
 
 @contextmanager
-def replacing(path: Path) -> Iterator[Any]:
-    """A file to write text into that takes the place of `path` in one step, once all is written.
+def replacing(path: Path, mode: str = "w") -> Iterator[Any]:
+    """A file to write text into (bytes: `wb`) that takes the place of `path` once all is written.
 
     A symbolic link there is replaced, and never followed: a folder may come from somebody else.
     """
+    encoding, newline = (None, None) if "b" in mode else ("utf-8", "")
     with tempfile.NamedTemporaryFile(
-        "w", dir=path.parent, prefix=".", encoding="utf-8", newline="", delete=False
+        mode, dir=path.parent, prefix=".", encoding=encoding, newline=newline, delete=False
     ) as file:
         try:
             os.fchmod(file.fileno(), 0o666 & ~UMASK)
