@@ -11,7 +11,7 @@ from freepath.errors import FreepathError
 from freepath.results import folder as results
 from freepath.results import reading
 from freepath.results.columns import COLUMNS, CONFIRM_COLUMNS, SAMPLE_COLUMNS
-from freepath.results.folder import CONFIRM, PLACE, RUN, SAMPLES, SUMMARY, ResultFolder
+from freepath.results.folder import CONFIRM, PLACE, RUN, SAMPLES, SUMMARY, ResultFolder, Row
 
 BESIDE = ("build-*.log", "pictures/*", "pictures/*/*")
 """What rows speak of beside the tables."""
@@ -25,28 +25,16 @@ def merge(found: Sequence[Path], output: Path) -> list[str]:
     Raises FreepathError, before anything is written, where two have a row of the same case on the
     same device, where they are of different configs, and where one cannot be read.
     """
-    for one in found:
-        if not (one / SUMMARY).is_file():
-            raise FreepathError(f"{one}: expected the folder of a run, with {SUMMARY} in it")
-    runs = [reading.facts(one / RUN) for one in found]
-    for one, run in zip(found, runs, strict=True):
-        if run.get("config_text") != runs[0].get("config_text"):
-            raise FreepathError(f"{one}: is of another config than {found[0]}; `report` takes both")
+    runs = _runs(found)
     rows, rounds, confirmed = [], [], []
     owners: dict[tuple[str, ...], str] = {}
     for one in found:
         cases, samples = results.read_result(one)
-        for row in cases:
-            here = f"{one / SUMMARY}:{row.line}"
-            place = tuple(row[name] for name in PLACE)
-            if place in owners:
-                where = f"{row['case']} on {row['device']}"
-                raise FreepathError(f"{here}: {where}: {owners[place]} has a row of it too")
-            owners[place] = here
         rows += cases
         rounds += samples
         if (one / CONFIRM).exists():
             confirmed += results.read_rows(one / CONFIRM, CONFIRM_COLUMNS)
+        _refuse_doubles(one / SUMMARY, cases, owners)
     folder = ResultFolder(output, confirm=bool(confirmed))
     files = dict(_beside(found))
     folder.open([])
@@ -65,6 +53,27 @@ def merge(found: Sequence[Path], output: Path) -> list[str]:
     finally:
         folder.close()
     return _told(found, runs)
+
+
+def _runs(found: Sequence[Path]) -> list[dict[str, Any]]:
+    """What run.json says of each; raises FreepathError where they are of different configs."""
+    for one in found:
+        if not (one / SUMMARY).is_file():
+            raise FreepathError(f"{one}: expected the folder of a run, with {SUMMARY} in it")
+    runs = [reading.facts(one / RUN) for one in found]
+    for one, run in zip(found, runs, strict=True):
+        if run.get("config_text") != runs[0].get("config_text"):
+            raise FreepathError(f"{one}: is of another config than {found[0]}; `report` takes both")
+    return runs
+
+
+def _refuse_doubles(path: Path, rows: Sequence[Row], owners: dict[tuple[str, ...], str]) -> None:
+    for row in rows:
+        here, place = f"{path}:{row.line}", tuple(row[name] for name in PLACE)
+        if place in owners:
+            what = f"{row['case']} on {row['device']}"
+            raise FreepathError(f"{here}: {what}: {owners[place]} has a row of it too")
+        owners[place] = here
 
 
 def _beside(found: Sequence[Path]) -> Iterator[tuple[Path, Path]]:
