@@ -26,6 +26,7 @@ from freepath.commands import (
     schema,
     source,
     trying,
+    worker,
 )
 from freepath.commands.common import let_go_of_output
 from freepath.errors import FAILED, INTERRUPTED, FreepathError
@@ -43,6 +44,7 @@ COMMANDS = {
     "schema": schema,
     "list": listing,
     "explain": explain,
+    "worker": worker,
     "devices": devices,
 }
 

@@ -116,7 +116,10 @@ def execute(options: Namespace) -> int:
     if options.cluster:
         from freepath.measure import cluster
 
-        with cluster.Cluster(options.cluster) as there:
+        def say(text: str) -> None:
+            print(f"freepath: {text}", file=sys.stderr)
+
+        with cluster.Cluster(options.cluster, say) as there:
             parts = there.parts(options.device)
             return _measure(options, parts, there.run, (loaded, known, cases), started)
     parts = selection.checked(selection.resolve(options.device))
@@ -145,7 +148,9 @@ def _measure(
 
     def make(resume: bool) -> Sweep:
         more = {"confirm": options.confirm, "clock": clock, "work_group": options.work_group}
-        more |= {"resume": resume or options.resume, "shard": options.shard}
+        more |= {"resume": resume or options.resume}
+        if options.shard:
+            more["beside"] = {"shard": "{}/{}".format(*options.shard)}
         made.append(api.sweep(loaded, path, known=known, cases=cases, **more))
         return made[-1]
 

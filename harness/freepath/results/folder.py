@@ -169,7 +169,7 @@ class ResultFolder:
         self._append(SUMMARY, COLUMNS, [row])
 
     def _append(self, name: str, columns: tuple[str, ...], rows: Iterable[Mapping]) -> None:
-        texts = [{column: _text(row[column]) for column in columns} for row in rows]
+        cells = [texts(row, columns) for row in rows]
         flags = os.O_WRONLY | os.O_APPEND | os.O_NOFOLLOW  # one that was removed is not made anew
         try:
             with open(
@@ -179,7 +179,7 @@ class ResultFolder:
                 encoding="utf-8",
                 opener=lambda path, _: os.open(path, flags),
             ) as file:
-                _writer(file, columns).writerows(texts)
+                _writer(file, columns).writerows(cells)
                 _flush(file)
         except OSError as error:
             raise _stopped(self.folder / name, error) from error
@@ -281,12 +281,17 @@ def key_of(row: Mapping[str, Any]) -> tuple[str, ...]:
     return _of(row, KEY)
 
 
-def _text(value: Any) -> Any:
+def texts(row: Mapping[str, Any], columns: tuple[str, ...]) -> dict[str, str]:
+    """The cells of a row."""
+    return {column: _text(row[column]) for column in columns}
+
+
+def _text(value: Any) -> str:
     """None is empty; floats in full; inf as the word that every reader of CSV knows."""
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return ""
     # of numpy's floats too, whose repr names their type
-    return repr(float(value)) if isinstance(value, float) else value
+    return repr(float(value)) if isinstance(value, float) else str(value)
 
 
 def read_rows(path: Path, columns: tuple[str, ...] = COLUMNS) -> list[Row]:
