@@ -29,7 +29,7 @@ from freepath.commands import (
     worker,
 )
 from freepath.commands.common import let_go_of_output
-from freepath.errors import FAILED, INTERRUPTED, FreepathError
+from freepath.errors import FAILED, INTERRUPTED, FreepathError, printable
 
 COMMANDS = {
     "run": run,
@@ -81,7 +81,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             sys.stdout.flush()
         return code
     except FreepathError as error:
-        print(f"freepath: {error}", file=sys.stderr)
+        print(printable(f"freepath: {error}"), file=sys.stderr)
         return error.exit_code
     except KeyboardInterrupt:
         print("freepath: interrupted", file=sys.stderr)
@@ -94,7 +94,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     except OSError as error:  # a full disk, of which standard output may be one
         let_go_of_output()
-        print(f"freepath: {error.filename or 'writing'}: {error.strerror}", file=sys.stderr)
+        told = f"freepath: {error.filename or 'writing'}: {error.strerror}"
+        print(printable(told), file=sys.stderr)
         return FAILED
 
 

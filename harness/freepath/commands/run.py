@@ -251,7 +251,8 @@ def _print(
     for told in folder.read_run().get("inputs") or ():
         console.print(told, highlight=False, markup=False, soft_wrap=True)
     print_tables(console, rows, load, options.baseline)
-    _print_times(console, sweep)
+    if not options.cluster:  # elsewhere, times of several machines are no shares of one
+        _print_times(console, sweep)
     if options.confirm:
         console.print(table.confirmed(folder.confirmed()), highlight=False)
     for written in folder.paths():

@@ -62,7 +62,7 @@ def execute(options: Namespace) -> int:
     from freepath.commands.common import console_of, own_folder, volume_of
     from freepath.device.selection import first, one_device
     from freepath.extras import candidate
-    from freepath.results.folder import new_folder
+    from freepath.results.folder import new_folder, write
 
     known, tracker, parent = candidate.read(options.tracker, options.like)
     volume = volume_of(options.volume, options.sigma_t or 1.0) if options.volume else None
@@ -92,7 +92,7 @@ def execute(options: Namespace) -> int:
     config = path / candidate.CONFIG
     others = {one.name: one for one in (parent, *candidate.relatives(known, tracker))}
     few = list(others.values())[: candidate.RELATIVES]
-    config.write_text(candidate.sweep_text(tracker, few, volume), "utf-8")
+    write(config, candidate.sweep_text(tracker, few, volume))
     return _measure(console, config, (known, tracker, parent), part)
 
 

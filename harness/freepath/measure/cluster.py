@@ -17,6 +17,7 @@ import logging
 import math
 import queue
 import re
+import signal
 import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -104,8 +105,14 @@ def serve(address: str, parts: Sequence[Part], host: str = "") -> None:
             "death_timeout": CONNECT_S,
             "startup_information": {"freepath": lambda _: own},
         }
+        stop = asyncio.Event()
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            asyncio.get_running_loop().add_signal_handler(number, stop.set)
         async with distributed.Worker(address, **options) as one:
-            await one.finished()
+            ends = [asyncio.ensure_future(end) for end in (one.finished(), stop.wait())]
+            await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
+        if stop.is_set():
+            raise KeyboardInterrupt
 
     with tempfile.TemporaryDirectory(prefix="freepath-") as folder:
         _own[:] = [Own(list(parts), Path(folder))]
@@ -417,7 +424,7 @@ class Cluster:
         sweep = self._sweep
         cases = [job.case for job in errand.left.values()]
         own = [t for t in sweep.catalog.trackers.values() if KERNELS not in t.path.parents]
-        sent = {
+        sent: Message = {
             "key": errand.key,
             "run_id": sweep.run_id,
             "device": device,

@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from freepath.errors import FreepathError, ResultError
+from freepath.errors import FreepathError, ResultError, printable
 from freepath.results import reading
 from freepath.results.columns import COLUMNS, CONFIRM_COLUMNS, SAMPLE_COLUMNS, TEXTS
 
@@ -201,8 +201,7 @@ class ResultFolder:
 
     def write_log(self, name: str, text: str) -> Path:
         """Write a compiler's log beside the rows."""
-        with replacing(self.folder / name) as file:
-            file.write(text)
+        write(self.folder / name, text)
         return self.folder / name
 
     def rows(self) -> list[Row]:
@@ -259,6 +258,12 @@ def replacing(path: Path, mode: str = "w") -> Iterator[Any]:
             raise
 
 
+def write(path: Path, text: str) -> None:
+    """Write a text file in the place of what is there."""
+    with replacing(path) as file:
+        file.write(text)
+
+
 def _stopped(path: Path, error: OSError) -> ResultError:
     why = error.strerror
     if isinstance(error, FileNotFoundError):
@@ -282,8 +287,14 @@ def key_of(row: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def texts(row: Mapping[str, Any], columns: tuple[str, ...]) -> dict[str, str]:
-    """The cells of a row."""
-    return {column: _text(row[column]) for column in columns}
+    """The cells of a row; texts command neither a terminal nor a spreadsheet."""
+    cells = {column: _text(row[column]) for column in columns}
+    return cells | {name: no_formula(printable(cells[name])) for name in TEXTS & cells.keys()}
+
+
+def no_formula(text: str) -> str:
+    """A text that no spreadsheet takes for a formula."""
+    return f"'{text}" if text[:1] in ("=", "+", "-", "@", "\t", "\r") else text
 
 
 def _text(value: Any) -> str:

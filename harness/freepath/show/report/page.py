@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import contextlib
 import html
 import json
-import os
 import re
 from collections import Counter
 from importlib import resources
-from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from freepath import __version__
 from freepath.results.columns import OF_SUMMARY
+from freepath.scene.cache import cached
 from freepath.show.report.charts import ACROSS, CHARTS, useful
 from freepath.show.report.data import Report
 from freepath.show.report.renders import panels
@@ -164,21 +164,11 @@ def _asset(name: str) -> str:
 
 
 def _library() -> str:
-    """Vega, Vega-Lite and Vega-Embed in one script; made once, as that takes seconds."""
+    """Vega, Vega-Lite and Vega-Embed in one script; kept under a seal, as making it takes long."""
     import vl_convert
 
-    folder = os.environ.get("FREEPATH_CACHE")
-    if not folder:
-        import platformdirs
+    def made() -> np.ndarray:
+        text = vl_convert.javascript_bundle().replace("</script", "<\\/script")
+        return np.frombuffer(text.encode(), np.uint8)
 
-        folder = platformdirs.user_cache_dir("freepath")
-    path = Path(folder) / f"vega-{vl_convert.__version__}.js"
-    with contextlib.suppress(OSError):
-        return path.read_text("utf-8")
-    text = vl_convert.javascript_bundle().replace("</script", "<\\/script")
-    with contextlib.suppress(OSError):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        part = path.with_suffix(f".{os.getpid()}")
-        part.write_text(text, encoding="utf-8")
-        part.replace(path)
-    return text
+    return cached(f"vega-{vl_convert.__version__}", made).tobytes().decode()
