@@ -31,10 +31,8 @@ ORDER = (
 PLACE = {name: place for place, name in enumerate(ORDER)}
 OPENCL = {"device/opencl.py", "measure/runner.py"}
 ONLY_CSV = {
-    # the pictures of a run are files beside its CSV; the ladder is arithmetic on a row; the script
-    # of the page is kept in the cache
-    "show/report": {"__init__", "errors", "results", "show", "measure.pictures", "measure.ladder"}
-    | {"scene.cache"},
+    # the pictures of a run are files beside its CSV; the ladder is arithmetic on a row
+    "show/report": {"__init__", "errors", "results", "show", "measure.pictures", "measure.ladder"},
     "show/compare": {"errors", "results", "show"},
     "show/table.py": {"errors"},
     "results": {"errors", "results"},

@@ -6,7 +6,7 @@ import socket
 import subprocess
 import sys
 import time
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
@@ -26,8 +26,7 @@ pytest.importorskip("distributed")
 CONFIG = """name: far
 rays: {orthographic: {resolution: 4}}
 matrix:
-  medium: [{homogeneous: {sigma_t: 1}}, {volume: {file: sub/v.npy, sigma_t: 2}},
-    {exponential: {sigma_t: 3, scale_height: 0.5}}]
+  medium: [{homogeneous: {sigma_t: 1}}, {volume: {file: sub/v.npy, sigma_t: 2}}]
   tracker: [delta, ratio]
 stop: {samples: 64, rounds: 2}
 """
@@ -62,6 +61,7 @@ def workers(address, device):
     words = ["-m", "freepath", "worker", address, "-d", selector_of(device.info)]
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("POCL_MAX_PTHREAD_COUNT", "1")
+        patch.setattr(cluster, "CONNECT_S", 300.0)
         with started(words) as one, started(words) as other:
             yield [one, other]
 
@@ -83,11 +83,11 @@ def rows(folder):
 
 
 def children():
-    return [
-        one
-        for one in psutil.Process().children(recursive=True)
-        if worker.__name__ in " ".join(one.cmdline())
-    ]
+    found = []
+    for one in psutil.Process().children(recursive=True):
+        with suppress(psutil.Error):  # it ends meanwhile
+            found += [one] if worker.__name__ in " ".join(one.cmdline()) else []
+    return found
 
 
 def test_rows_are_those_of_one_machine(planted, workers, address, device, monkeypatch, capsys):
@@ -108,7 +108,7 @@ def test_rows_are_those_of_one_machine(planted, workers, address, device, monkey
     for case, row in there.items():
         differ = {name for name in row if row[name] != here[case][name]}
         assert all(name.startswith(DIFFER) for name in differ), differ
-    assert len(read_rows(Path("there/samples.csv"), SAMPLE_COLUMNS)) == 12
+    assert len(read_rows(Path("there/samples.csv"), SAMPLE_COLUMNS)) == 8
     assert len({address for address, *_ in sent}) == len(sent) > 0
     (session,) = json.loads(Path("there/run.json").read_text())["sessions"]
     assert session["ended"] == "complete"
@@ -151,11 +151,11 @@ def test_a_worker_that_is_killed_loses_nothing(planted, workers, address):
         there.run(sweep, part)
     assert {row["status"] for row in rows("out").values()} == {"ok"}
     assert sorted(seen) == sorted(rows("out"))
-    assert len(seen) == 24
+    assert len(seen) == 16
     assert sum("was lost" in line for line in told) == len(told) <= 1
 
 
-def test_who_is_not_there(address):
+def test_who_is_not_there(workers, address):
     with cluster.Cluster(address, pytest.fail) as there:
         with pytest.raises(DeviceError, match="no device of a worker matches 'nobody'; there are"):
             there.parts(["nobody"])
@@ -215,7 +215,7 @@ def test_a_case_at_which_workers_vanish_is_given_up(planted, device):
         jobs = {job.case.case_id: job for group in groups for job in group}
         culprit = list(jobs)[2]
         fake._errands["a"] = cluster.Errand("a", "gone", jobs, culprit, Future())
-        assert [len(group) for group in fake._lost({})] == [2, 1, 2, 1]
+        assert [len(group) for group in fake._lost({})] == [2, 1, 1]
         alone = {culprit: jobs[culprit]}
         fake._errands["b"] = cluster.Errand("b", "gone", alone, "", Future())
         assert fake._lost({}) == []
@@ -226,4 +226,4 @@ def test_a_case_at_which_workers_vanish_is_given_up(planted, device):
     (row,) = read_rows(Path("out/summary.csv"))
     assert row["status"] == "run_failed"
     assert row["reason"] == f"{cluster.LOST['reason']}, also when it was tried again alone"
-    assert "gone was lost; 6 cases go to others" in told[0]
+    assert "gone was lost; 4 cases go to others" in told[0]

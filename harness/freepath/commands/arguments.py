@@ -49,6 +49,17 @@ def add_output(command: Any, what: str, name: str) -> None:
     action.complete = shtab.DIRECTORY
 
 
+def add_timeout(command: Any) -> None:
+    """--timeout, of builds and launches."""
+    command.add_argument(
+        "--timeout",
+        type=positive,
+        metavar="SECONDS",
+        help="give a case up whose build, or one of whose launches, takes longer, twice (default: "
+        "60 s and 20 times its at_most, on Oclgrind ten times that)",
+    )
+
+
 def add_sigma_t(command: Any) -> None:
     """--sigma-t; None where it is not given, which stands for 1."""
     told = "extinction where the volume's density is 1 (default: 1)"

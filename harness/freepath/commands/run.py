@@ -16,7 +16,7 @@ from freepath.commands.arguments import (
     add_config,
     add_device,
     add_output,
-    positive,
+    add_timeout,
     shard,
 )
 from freepath.commands.common import cases_of, console_of, print_tables, unread
@@ -87,13 +87,7 @@ def add(commands: Any) -> None:
     )
     run.add_argument("--json", action="store_true", help="print the rows as JSON, nothing else")
     add_baseline(run)
-    run.add_argument(
-        "--timeout",
-        type=positive,
-        metavar="SECONDS",
-        help="give a case up whose build, or one of whose launches, takes longer, twice (default: "
-        "60 s and 20 times its at_most, on Oclgrind ten times that)",
-    )
+    add_timeout(run)
 
 
 def execute(options: Namespace) -> int:

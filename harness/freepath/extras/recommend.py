@@ -94,6 +94,8 @@ class Search:
     """A regular expression that names of trackers match."""
     renderer: Renderer | None = None
     """What is recommended is what it has; all the rest is measured for the ratio."""
+    timeout_s: float | None = None
+    """What --timeout takes."""
     measured: int = 0
     spent_s: float = 0.0
     """Of the budget."""
@@ -268,7 +270,7 @@ class Search:
         )
         self.dense = self.dense or self._density(sweep)
         try:
-            worker.run(sweep, self.part)
+            worker.run(sweep, self.part, self.timeout_s)
         finally:
             rows = self._note_all(sweep)
             took = self.clock.outside_s - before

@@ -45,7 +45,7 @@ from freepath.results.columns import COLUMNS
 from freepath.results.folder import CONFIRM_COLUMNS, SAMPLE_COLUMNS, ResultFolder, replacing, texts
 from freepath.scene.volumes.files import find_file
 
-CONNECT_S = 30.0
+CONNECT_S = 60.0
 """Within which a scheduler, and a first worker, must answer."""
 PIECE = 1 << 24
 """Bytes of a file that are sent at once."""
@@ -298,8 +298,16 @@ class Cluster:
         self._client.close()
 
     def workers(self) -> dict[str, Message]:
-        """What each worker says of itself, by its address: those that can be used."""
-        listed = self._client.scheduler_info(n_workers=-1)["workers"]
+        """What each worker says of itself, by its address: those that can be used.
+
+        Raises RunError where the scheduler is gone.
+        """
+        try:  # what the client itself keeps of it has no workers in it now and then
+            identity = self._client.sync(self._client.scheduler.identity, n_workers=-1)
+        except OSError as error:
+            hint = "rows that were finished stand; go on by --resume"
+            raise RunError(f"{self.address}: the scheduler is gone: {error}; {hint}") from error
+        listed = identity["workers"]
         found = {at: one["freepath"] for at, one in listed.items() if "freepath" in one}
         for at, one in found.items():
             if one["version"] != _version():

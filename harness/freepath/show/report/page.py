@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
+import hashlib
 import html
 import json
+import os
 import re
 from collections import Counter
 from importlib import resources
+from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from freepath import __version__
 from freepath.results.columns import OF_SUMMARY
-from freepath.scene.cache import cached
+from freepath.results.folder import write
 from freepath.show.report.charts import ACROSS, CHARTS, useful
 from freepath.show.report.data import Report
 from freepath.show.report.renders import panels
@@ -164,11 +166,21 @@ def _asset(name: str) -> str:
 
 
 def _library() -> str:
-    """Vega, Vega-Lite and Vega-Embed in one script; kept under a seal, as making it takes long."""
+    """Vega, Vega-Lite and Vega-Embed in one script; kept behind its hash: it takes long to make."""
     import vl_convert
 
-    def made() -> np.ndarray:
-        text = vl_convert.javascript_bundle().replace("</script", "<\\/script")
-        return np.frombuffer(text.encode(), np.uint8)
+    folder = os.environ.get("FREEPATH_CACHE")
+    if not folder:
+        import platformdirs
 
-    return cached(f"vega-{vl_convert.__version__}", made).tobytes().decode()
+        folder = platformdirs.user_cache_dir("freepath")
+    path = Path(folder) / f"vega-{vl_convert.__version__}.js"
+    with contextlib.suppress(OSError, UnicodeDecodeError):
+        seal, _, text = path.read_text("utf-8").partition("\n")
+        if seal == hashlib.sha256(text.encode()).hexdigest():
+            return text
+    text = vl_convert.javascript_bundle().replace("</script", "<\\/script")
+    with contextlib.suppress(OSError):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write(path, f"{hashlib.sha256(text.encode()).hexdigest()}\n{text}")
+    return text
