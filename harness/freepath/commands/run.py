@@ -137,7 +137,8 @@ def _measure(
     load, clock = environment.load(), Clock(started)
     found = results.newest_folder if options.resume else results.new_folder
     path = options.output or found(loaded.name)
-    results.ResultFolder(path, resume=options.resume)  # refuses what it cannot write to
+    # refuses what it cannot write to
+    _say_what_was_at_work(results.ResultFolder(path, resume=options.resume))
     made: list[Sweep] = []
 
     def make(resume: bool) -> Sweep:
@@ -189,6 +190,12 @@ def _repeat(options: Namespace, name: str) -> int:
             return code
         worst = max(worst, code)
     return worst
+
+
+def _say_what_was_at_work(folder: ResultFolder) -> None:
+    if noted := folder.noted:
+        told = f"the run before was killed at work on {noted}"
+        print(f"freepath: {folder.folder}: {told}", file=sys.stderr)
 
 
 def _say_what_is_missing(part: Part, cases: list[Case], sweep: Sweep | None) -> None:

@@ -208,6 +208,7 @@ class Sweep:
 
     def _work_at(self, job: Job) -> None:
         self.state[1] = self._numbers[job]
+        self.folder.note(job.case.name)
 
     def _run(self, jobs: list[Job]) -> None:
         """Build and measure jobs side by side; each row is written as it ends."""

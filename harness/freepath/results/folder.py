@@ -11,7 +11,7 @@ import os
 import re
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -21,9 +21,11 @@ from freepath.results.columns import COLUMNS, CONFIRM_COLUMNS, SAMPLE_COLUMNS, T
 
 SCHEMA_VERSION = 6
 SUMMARY, SAMPLES, CONFIRM, RUN = "summary.csv", "samples.csv", "confirm.csv", "run.json"
+LONGEST_NAME = 4096
+"""Bytes of a case's name."""
 CHECKS = "checks.json"
 """What became of the checks of a tracker on trial."""
-LOCK = ".lock"
+LOCK, AT_WORK = ".lock", ".at-work"
 RESULTS = Path("results")
 STAMP = "%Y%m%d-%H%M%S"
 PLACE = ("case_id", "device", "platform")
@@ -54,7 +56,7 @@ class ResultFolder:
         self._resume = resume
         self._confirm = confirm
         self._lock: Any = None
-        self._locked = 0
+        self._locked, self._at_work = 0, -1
         try:
             if folder.exists() and not folder.is_dir():
                 raise FreepathError(f"{folder}: is a file, expected a folder for the results")
@@ -92,6 +94,8 @@ class ResultFolder:
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
             self._acquire()
+            flags = os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW
+            self._at_work = os.open(self.folder / AT_WORK, flags, 0o666)
             old = self.rows() if self._resume else []
             predicted = self._old(CONFIRM, CONFIRM_COLUMNS)
             needed = {_of(row, SESSION) for row in predicted} if self._confirm else None
@@ -140,9 +144,27 @@ class ResultFolder:
     def close(self) -> None:
         """Let others write here."""
         if self._lock:
+            if self._at_work >= 0:
+                os.close(self._at_work)
+                self._at_work = -1
+            (self.folder / AT_WORK).unlink(missing_ok=True)
             (self.folder / LOCK).unlink(missing_ok=True)
             self._lock.release()
             self._lock = None
+
+    def note(self, case: str) -> None:
+        """Note which case is at work, for who goes on where everything was killed."""
+        with suppress(OSError):  # a full disk is told where a row is written
+            os.pwrite(self._at_work, case.encode().ljust(LONGEST_NAME), 0)
+
+    @property
+    def noted(self) -> str:
+        """The case that was at work when a run here was killed; '' where none was, or it ended."""
+        with suppress(OSError):
+            file = os.open(self.folder / AT_WORK, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
+            with open(file, "rb") as opened:
+                return printable(opened.read(LONGEST_NAME).decode(errors="replace").strip())
+        return ""
 
     def _old(self, name: str, columns: tuple[str, ...]) -> list[Row]:
         """The rows of a file of the run that is gone on with."""
