@@ -119,23 +119,6 @@ def test_rows_are_those_of_one_machine(planted, workers, address, device, monkey
     assert rows("there") == before
 
 
-def test_an_interruption_ends_what_runs_elsewhere(planted, workers, address):
-    def interrupt(row):
-        raise KeyboardInterrupt
-
-    with cluster.Cluster(address, pytest.fail) as there:
-        (part,) = there.parts([])
-        sweep = api.sweep("far.yaml", "out")
-        sweep.listener.row = interrupt
-        with pytest.raises(KeyboardInterrupt):
-            there.run(sweep, part)
-    assert len(rows("out")) == 1
-    until = time.monotonic() + 60
-    while children() and time.monotonic() < until:
-        time.sleep(0.1)
-    assert not children()
-
-
 def test_a_worker_that_is_killed_loses_nothing(planted, workers, address):
     told, seen = [], []
 
@@ -153,6 +136,23 @@ def test_a_worker_that_is_killed_loses_nothing(planted, workers, address):
     assert sorted(seen) == sorted(rows("out"))
     assert len(seen) == 16
     assert sum("was lost" in line for line in told) == len(told) <= 1
+
+
+def test_an_interruption_ends_what_runs_elsewhere(planted, workers, address):
+    def interrupt(row):
+        raise KeyboardInterrupt
+
+    with cluster.Cluster(address, pytest.fail) as there:
+        (part,) = there.parts([])
+        sweep = api.sweep("far.yaml", "out")
+        sweep.listener.row = interrupt
+        with pytest.raises(KeyboardInterrupt):
+            there.run(sweep, part)
+    assert len(rows("out")) == 1
+    until = time.monotonic() + 60
+    while children() and time.monotonic() < until:
+        time.sleep(0.1)
+    assert not children()
 
 
 def test_who_is_not_there(workers, address):
