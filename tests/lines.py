@@ -12,17 +12,17 @@ PACKAGE = ROOT / "harness" / "freepath"
 BUDGET = {
     "checks": 4600,
     "kernels": 3100,
-    "scene": 3000,
-    "show": 3150,
-    "measure": 2620,
+    "scene": 3010,
+    "show": 3175,
+    "measure": 3220,
     "config": 2100,
-    "commands": 1700,
-    "device": 1400,
+    "commands": 1860,
+    "device": 1410,
     "compose": 1000,
-    "results": 680,
-    "extras": 838,
-    "modules on the first floor": 450,
-    "cases": 300,
+    "results": 835,
+    "extras": 840,
+    "modules on the first floor": 455,
+    "cases": 320,
 }
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +15,8 @@ if TYPE_CHECKING:
     from freepath.compose.catalog import Catalog
     from freepath.config import Config
     from freepath.device.opencl import Device
-    from freepath.measure.sweep import Sweep
+    from freepath.device.selection import Part
+    from freepath.measure.sweep import Listener, Sweep
 
 
 def sweep(  # noqa: PLR0913 (what a sweep is made of; most has a default)
@@ -79,15 +81,49 @@ def run(
         listener.row = _say
     elif callable(progress):
         listener.progress = progress
-    prepared = None
-    for driver, infos, failure in selection.checked(selection.resolve(list(devices))):
-        if failure:
-            raise RunError(f"{driver.name}: {failure}")
-        folder = prepared.folder.folder if prepared else output
-        resumed = prepared is not None and prepared.folder.holds_rows
-        prepared = sweep(config, folder, axes=axes, resume=resumed, listener=listener)
-        worker.run(prepared, selection.Part(driver, infos), timeout_s)
-    return load(prepared.folder.folder)
+    parts = selection.checked(selection.resolve(list(devices)))
+    folder = output
+
+    def make(resume: bool) -> Sweep:
+        nonlocal folder
+        made = sweep(config, folder, axes=axes, resume=resume)
+        folder = made.folder.folder
+        return made
+
+    def measure(made: Sweep, part: Part) -> None:
+        worker.run(made, part, timeout_s)
+
+    done = list(each_driver(parts, make, measure, lambda part: nullcontext(listener)))
+    for part, _ in done:
+        if part.failure:
+            raise RunError(f"{part.driver.name}: {part.failure}")
+    return load(folder)
+
+
+def each_driver(
+    parts: Iterable[Part],
+    make: Callable[[bool], Sweep],
+    measure: Callable[[Sweep, Part], None],
+    watched: Callable[[Part], AbstractContextManager[Listener]],
+) -> Iterator[tuple[Part, Sweep | None]]:
+    """Measure a sweep on one driver after the other, into one folder.
+
+    `make` makes it, told whether the folder holds rows of an earlier driver; `watched` gives the
+    listener for a part. Yields each part when it is done, with why it failed if it did, and its
+    sweep; None for one that cannot be used.
+    """
+    sweep = None
+    for part in parts:
+        if part.failure:
+            yield part, None
+            continue
+        sweep = make(sweep is not None and sweep.folder.holds_rows)
+        try:
+            with watched(part) as sweep.listener:
+                measure(sweep, part)
+        except RunError as error:
+            part = part._replace(failure=str(error))  # noqa: PLW2901 (the same, with its end)
+        yield part, sweep
 
 
 def _say(row: dict[str, Any]) -> None:

@@ -18,6 +18,7 @@ from freepath.commands import (
     devices,
     explain,
     listing,
+    merge,
     new_tracker,
     recommend,
     report,
@@ -25,9 +26,10 @@ from freepath.commands import (
     schema,
     source,
     trying,
+    worker,
 )
 from freepath.commands.common import let_go_of_output
-from freepath.errors import FAILED, INTERRUPTED, FreepathError
+from freepath.errors import FAILED, INTERRUPTED, FreepathError, printable
 
 COMMANDS = {
     "run": run,
@@ -35,12 +37,14 @@ COMMANDS = {
     "recommend": recommend,
     "try": trying,
     "new-tracker": new_tracker,
+    "merge": merge,
     "report": report,
     "compare": compare,
     "source": source,
     "schema": schema,
     "list": listing,
     "explain": explain,
+    "worker": worker,
     "devices": devices,
 }
 
@@ -77,7 +81,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             sys.stdout.flush()
         return code
     except FreepathError as error:
-        print(f"freepath: {error}", file=sys.stderr)
+        print(printable(f"freepath: {error}"), file=sys.stderr)
         return error.exit_code
     except KeyboardInterrupt:
         print("freepath: interrupted", file=sys.stderr)
@@ -90,7 +94,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     except OSError as error:  # a full disk, of which standard output may be one
         let_go_of_output()
-        print(f"freepath: {error.filename or 'writing'}: {error.strerror}", file=sys.stderr)
+        told = f"freepath: {error.filename or 'writing'}: {error.strerror}"
+        print(printable(told), file=sys.stderr)
         return FAILED
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -15,6 +16,15 @@ FAILED = 8
 INTERRUPTED = 130
 PACKAGES = {"vl_convert": "vl-convert-python"}
 """Packages of modules that have another name."""
+
+
+CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
+"""What commands a terminal, or has a line read in another direction than it is written in."""
+
+
+def printable(text: str) -> str:
+    """A text with nothing in it that would command a terminal; lines and tabs stay."""
+    return CONTROL.sub("?", text)
 
 
 class FreepathError(Exception):

@@ -382,3 +382,43 @@ def test_invalid_expressions_are_mistakes_of_usage(expand):
     first, second = str(caught.value).splitlines()
     assert first.startswith("-R (: expected a regular expression: ")
     assert second.startswith("-E [a: expected a regular expression: ")
+
+
+SCENES = (
+    "{medium: [homogeneous: {sigma_t: 1}, homogeneous: {sigma_t: 2}, homogeneous: {sigma_t: 3},"
+    " cloud: {resolution: 8, sigma_t: 1}], majorant: [global, grid: {resolution: 4}],"
+    " tightness: [1, 2], tracker: [delta, march]}"
+)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 4, 5, 7, 18])
+def test_shards_hold_each_case_once(expand, count):
+    """As whole scenes where there are as many as parts, else each is of one scene."""
+    cases = expand(SCENES)
+    parts = [plan.shard(cases, number, count) for number in range(1, count + 1)]
+    assert sorted(case.index for part in parts for case in part) == [c.index for c in cases]
+    assert all(part == sorted(part, key=lambda case: case.index) for part in parts)
+    homes = [{i for i, part in enumerate(parts) for c in part if c.scene == s}
+             for s in {case.scene for case in cases}]  # fmt: skip
+    if count <= 4:
+        assert all(len(home) == 1 for home in homes)
+    else:
+        assert all(len({case.scene for case in part}) == 1 for part in parts)
+        sizes = [len(part) for part in parts]
+        assert max(sizes) <= 2 * min(sizes) + 1
+
+
+def test_a_shard_without_a_case(expand):
+    cases = expand(SCENES)
+    with pytest.raises(NothingMatchedError, match=f"part 99 of 99 is empty, of {len(cases)}"):
+        plan.shard(cases, 99, 99)
+
+
+@pytest.mark.parametrize("text", ["0/3", "4/3", "x", "1/", "/2", "-1/2", "1/2/3", "1.5/2", ""])
+def test_what_is_no_shard(text, capsys):
+    from freepath.cli import parser
+
+    with pytest.raises(SystemExit) as caught:
+        parser().parse_args(["run", "quick", f"--shard={text}"])
+    assert caught.value.code == 2
+    assert f"expected I/N with I from 1 to N, such as 2/8, got '{text}'" in capsys.readouterr().err

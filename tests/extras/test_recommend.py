@@ -233,6 +233,20 @@ def test_what_is_known_is_told_when_it_is_interrupted(call, cloud, monkeypatch):
         assert told in text
 
 
+def test_what_hangs_may_take_so_long(call, cloud, monkeypatch):
+    given = []
+
+    def measured(sweep, part, timeout_s=None):
+        given.append(timeout_s)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(recommend.worker, "run", measured)
+    assert call(cloud, "-o", "a", "--timeout", "7")[0] in (8, 130)
+    assert call(cloud, "-o", "b")[0] in (8, 130)
+    assert given == [7.0, None]
+    assert call(cloud, "--timeout", "0")[0] == 2
+
+
 def test_a_budget_that_is_used_up_says_what_is_missing():
     search = noted(row_of("march", 1e-6))
     search.spent_s = 2.0

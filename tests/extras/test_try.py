@@ -86,6 +86,21 @@ def test_accepted_and_measured(call, file, monkeypatch):
     assert main(["run", "out/try.yaml", "--trackers", file.name, "-N"]) == 0
 
 
+def test_what_hangs_may_take_so_long(call, file, monkeypatch):
+    from freepath.measure import worker
+
+    given = []
+
+    def measured(sweep, part, timeout_s=None):
+        given.append(timeout_s)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(worker, "run", measured)
+    monkeypatch.setattr(candidate, "checks_of", lambda *given, every: [])
+    assert call(file, "-o", "out", "--timeout", "7")[0] == 130
+    assert given == [7.0]
+
+
 def test_rejected_with_what_was_measured(call, file, monkeypatch):
     file.write_text(SLIPS[7].text)
     chosen = candidate.checks_of

@@ -233,7 +233,7 @@ def test_a_missing_line_end_does_not_join_rows(tmp_path):
 
 def test_files_of_another_version_are_refused(tmp_path):
     (tmp_path / SUMMARY).write_text("a,b\n1,2\n")
-    with pytest.raises(FreepathError, match="its columns are not those of schema version 5"):
+    with pytest.raises(FreepathError, match="its columns are not those of schema version 6"):
         resumed(tmp_path)
 
 
@@ -319,7 +319,7 @@ DAMAGES = [
         f"summary.csv:2: expected {len(COLUMNS)} cells, as the first line has, got fewer",
     ),
     (SUMMARY, ",thing,", ",\x1b]0;x\x07,", "summary.csv:2: column 7, device: holds a control"),
-    (SUMMARY, ",none,", ",grid-8,", "summary.csv:2: column 16, tightness: expected a number, as"),
+    (SUMMARY, ",none,", ",grid-8,", "summary.csv:2: column 17, tightness: expected a number, as"),
     (SUMMARY, "/a/auto/strict", "", "summary.csv:2: column 4, case: expected estimand/medium/"),
     (SUMMARY, ",ok,", ",fine,", "summary.csv:2: column 5, status: expected one of ok, skipped"),
     (SUMMARY, ",2,", ",3,", "summary.csv:2: transmittance/m/a/auto/strict: expected 3 rounds of"),
@@ -369,5 +369,32 @@ def test_a_damaged_run_json_is_refused(tmp_path, capsys, text):
 
 def test_an_empty_summary_is_refused(tmp_path):
     (tmp_path / SUMMARY).write_text("")
-    with pytest.raises(FreepathError, match="its columns are not those of schema version 5"):
+    with pytest.raises(FreepathError, match="its columns are not those of schema version 6"):
         resumed(tmp_path)
+
+
+def test_the_case_at_work_when_all_was_killed_is_known(tmp_path):
+    """Until the next run has taken over, which has a case of its own, or none when it ends."""
+    killed = ResultFolder(tmp_path / "out")
+    killed.open([])
+    assert killed.noted == ""
+    killed.note("a/long/name/of/a/case")
+    killed.note("short\x1b[31m")
+    (tmp_path / "out" / ".lock").unlink()  # the system lets go of it
+    following = ResultFolder(tmp_path / "out", resume=True)
+    assert following.noted == "short?[31m"
+    following.open([])
+    assert following.noted == ""
+    following.close()
+    assert not (tmp_path / "out" / ".at-work").exists()
+    assert following.noted == ""
+
+
+def test_what_is_at_work_is_noted_in_no_other_file(tmp_path):
+    written(tmp_path / "out")
+    (tmp_path / "victim").write_text("mine")
+    (tmp_path / "out" / ".at-work").symlink_to(tmp_path / "victim")
+    with pytest.raises(FreepathError, match="cannot be written to"):
+        resumed(tmp_path / "out")
+    assert (tmp_path / "victim").read_text() == "mine"
+    assert ResultFolder(tmp_path / "out", resume=True).noted == ""

@@ -26,7 +26,7 @@ TELLING = compare.Settings(factor=1.05, drift=2.0)
 
 def row_of(name, **changes):
     row = dict.fromkeys(COLUMNS, "") | {
-        "schema_version": "5",
+        "schema_version": "6",
         "run_id": "r",
         "case_id": name,
         "case": f"transmittance/m/{name}/auto/strict",
@@ -399,7 +399,7 @@ def test_what_should_not_be_compared_is_refused(tmp_path, runs, capsys):
     assert "expected the folder of a run" in capsys.readouterr().err
     (b / "summary.csv").write_text("a,b\n")
     assert main(["compare", str(a), str(b)]) == 2
-    assert "schema version 5" in capsys.readouterr().err
+    assert "schema version 6" in capsys.readouterr().err
     assert main(["compare", str(a), str(a), "-o", "x.pdf"]) == 2
 
 

@@ -77,6 +77,11 @@ class Case:
         }
 
     @property
+    def scene(self) -> str:
+        """What cases share that are measured in turns: their medium."""
+        return str(self.medium.as_dict())
+
+    @property
     def config_sha256(self) -> str:
         """The hash of all of `identity`."""
         return _sha256(self.identity())
@@ -197,6 +202,29 @@ def select(cases: list[Case], include: str | None = None, exclude: str | None = 
     if not selected:
         raise NothingMatchedError(f"no case: the filters match none of {len(cases)}")
     return selected
+
+
+def shard(cases: list[Case], number: int, count: int) -> list[Case]:
+    """Return the `number`-th of `count` parts of the cases, in their order; each is in one part.
+
+    Cases of a scene are measured in turns, so scenes stay whole where there are as many as parts:
+    the largest first, each goes to the part that has the fewest cases. Where there are fewer, each
+    is cut into as equal parts as can be. Raises NothingMatchedError for a part without a case.
+    """
+    scenes: dict[str, list[Case]] = {}
+    for case in cases:
+        scenes.setdefault(case.scene, []).append(case)
+    pieces = [(members, 1) for members in scenes.values()]
+    while sum(cuts for _, cuts in pieces) < min(count, len(cases)):
+        most = max(range(len(pieces)), key=lambda i: len(pieces[i][0]) / pieces[i][1])
+        pieces[most] = (pieces[most][0], pieces[most][1] + 1)
+    cut = [members[first::cuts] for members, cuts in pieces for first in range(cuts)]
+    parts: list[list[Case]] = [[] for _ in range(count)]
+    for piece in sorted(cut, key=len, reverse=True):
+        min(parts, key=len).extend(piece)
+    if not parts[number - 1]:
+        raise NothingMatchedError(f"no case: part {number} of {count} is empty, of {len(cases)}")
+    return sorted(parts[number - 1], key=lambda case: case.index)
 
 
 def _compiled(expressions: dict[str, str | None]) -> dict[str, re.Pattern[str]]:

@@ -49,6 +49,17 @@ def add_output(command: Any, what: str, name: str) -> None:
     action.complete = shtab.DIRECTORY
 
 
+def add_timeout(command: Any) -> None:
+    """--timeout, of builds and launches."""
+    command.add_argument(
+        "--timeout",
+        type=positive,
+        metavar="SECONDS",
+        help="give a case up whose build, or one of whose launches, takes longer, twice (default: "
+        "60 s and 20 times its at_most, on Oclgrind ten times that)",
+    )
+
+
 def add_sigma_t(command: Any) -> None:
     """--sigma-t; None where it is not given, which stands for 1."""
     told = "extinction where the volume's density is 1 (default: 1)"
@@ -106,3 +117,12 @@ def positive(text: str) -> float:
     if not 0.0 < value < 1e30:
         raise argparse.ArgumentTypeError(f"expected a number above 0, got '{text}'")
     return value
+
+
+def shard(text: str) -> tuple[int, int]:
+    """I/N, the I-th of N parts, as the type of an argument."""
+    number, _, count = text.partition("/")
+    if not (number.isdecimal() and count.isdecimal() and 1 <= int(number) <= int(count)):
+        expected = "expected I/N with I from 1 to N, such as 2/8"
+        raise argparse.ArgumentTypeError(f"{expected}, got '{text}'")
+    return int(number), int(count)

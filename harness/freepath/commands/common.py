@@ -12,6 +12,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from freepath.errors import printable
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -57,6 +59,7 @@ MARK = ".freepath-made"
 def own_folder(folder: Path, command: str) -> None:
     """Make a folder, or empty one that the same command made; raises UsageError for any other."""
     from freepath.errors import UsageError
+    from freepath.results.folder import write
 
     mark = folder / MARK
     try:
@@ -67,7 +70,7 @@ def own_folder(folder: Path, command: str) -> None:
         for one in held:
             shutil.rmtree(one) if one.is_dir() and not one.is_symlink() else one.unlink()
         folder.mkdir(parents=True, exist_ok=True)
-        mark.write_text(command, "utf-8")
+        write(mark, command)
     except OSError as error:
         raise UsageError(f"{folder}: cannot be a folder for results: {error.strerror}") from error
 
@@ -88,6 +91,9 @@ def console_of(*, stderr: bool = False, width: int = 160) -> Console:
     from rich.console import Console
 
     class Plain(Console):
+        def render_str(self, text: str, **given: Any) -> Any:
+            return super().render_str(printable(text), **given)
+
         def on_broken_pipe(self) -> None:
             raise BrokenPipeError  # which main knows; rich would exit with 1
 

@@ -14,6 +14,7 @@ from freepath.commands.arguments import (
     add_device,
     add_output,
     add_sigma_t,
+    add_timeout,
     add_trackers,
     expression,
     number_or_percent,
@@ -72,6 +73,7 @@ def add(commands: Any) -> None:
     )
     add_sigma_t(recommend)
     add_output(recommend, "results and config", "recommend-NAME")
+    add_timeout(recommend)
     recommend.add_argument(
         "-R",
         "--include",
@@ -123,7 +125,8 @@ def execute(options: Namespace) -> int:
     interrupted = ""
     with _shown_progress(console, rows=False) as listener:
         renderer = RENDERERS.get(options.renderer)
-        search = Search(known, part, folder, *asked, listener, clock, options.include, renderer)
+        more = options.include, renderer, options.timeout
+        search = Search(known, part, folder, *asked, listener, clock, *more)
         try:
             search.run()
         except KeyboardInterrupt:

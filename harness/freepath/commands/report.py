@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import shtab
 
 from freepath.commands.arguments import add_baseline
+from freepath.errors import printable
 
 if TYPE_CHECKING:
     from freepath.show.report import Report
@@ -77,4 +78,4 @@ def execute(options: Namespace) -> int:
 
 def _say_what_is_left_out(found: Report) -> None:
     for one in found.left_out:
-        print(f"freepath: left out: {one}", file=sys.stderr)
+        print(printable(f"freepath: left out: {one}"), file=sys.stderr)

@@ -7,7 +7,7 @@ import re
 import sys
 import time
 from argparse import Namespace
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -16,16 +16,19 @@ from freepath.commands.arguments import (
     add_config,
     add_device,
     add_output,
-    positive,
+    add_timeout,
+    shard,
 )
 from freepath.commands.common import cases_of, console_of, print_tables, unread
-from freepath.errors import FAILED, INTERRUPTED, RunError, UsageError
+from freepath.errors import FAILED, INTERRUPTED, UsageError
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from freepath.cases.plan import Case
-    from freepath.device.selection import Part
+    from freepath.compose.catalog import Catalog
+    from freepath.config import Config
+    from freepath.device.selection import Part, Parts
     from freepath.measure.sweep import Listener, Sweep
     from freepath.results.folder import ResultFolder
 
@@ -71,72 +74,105 @@ def add(commands: Any) -> None:
     )
     told = "run all N times, into DIR/NAME-1 to DIR/NAME-N: DIR is a side for `freepath compare`"
     run.add_argument("--repeat", type=int, default=1, metavar="N", help=told)
+    run.add_argument(
+        "--shard",
+        type=shard,
+        metavar="I/N",
+        help="only the I-th of N parts of the cases, which `freepath merge` joins",
+    )
+    run.add_argument(
+        "--cluster",
+        metavar="ADDRESS",
+        help="measure on the workers (`freepath worker ADDRESS`) of dask's scheduler there",
+    )
     run.add_argument("--json", action="store_true", help="print the rows as JSON, nothing else")
     add_baseline(run)
-    run.add_argument(
-        "--timeout",
-        type=positive,
-        metavar="SECONDS",
-        help="give a case up whose build, or one of whose launches, takes longer, twice (default: "
-        "60 s and 20 times its at_most, on Oclgrind ten times that)",
-    )
+    add_timeout(run)
 
 
 def execute(options: Namespace) -> int:
     """Run it; returns the exit code."""
     started = time.perf_counter()
     loaded, known, cases = cases_of(options)
+    if options.shard:
+        from freepath.cases import plan
+
+        cases = plan.shard(cases, *options.shard)
     if options.show_only:
         return _show_only(options, cases)
     if options.baseline and not any(re.search(options.baseline, case.name) for case in cases):
         raise UsageError(f"--baseline {options.baseline}: no case has a name that matches")
-    from freepath import api
-    from freepath.device import environment, selection
+    from freepath.device import selection
     from freepath.measure import worker
-    from freepath.measure.sweep import Clock
-    from freepath.results import folder as results
 
     if options.repeat != 1:
         return _repeat(options, loaded.name)
-    load, clock = environment.load(), Clock(started)
+    if options.cluster:
+        from freepath.measure import cluster
+
+        def say(text: str) -> None:
+            print(f"freepath: {text}", file=sys.stderr)
+
+        with cluster.Cluster(options.cluster, say) as there:
+            parts = there.parts(options.device)
+            return _measure(options, parts, there.run, (loaded, known, cases), started)
     parts = selection.checked(selection.resolve(options.device))
+    return _measure(options, parts, worker.run, (loaded, known, cases), started)
+
+
+def _measure(
+    options: Namespace,
+    parts: Parts,
+    run: Callable[[Sweep, Part, float | None], None],
+    given: tuple[Config, Catalog, list[Case]],
+    started: float,
+) -> int:
+    """Measure the cases on each part by `run`, and show them; returns the exit code."""
+    from freepath import api
+    from freepath.device import environment
+    from freepath.measure.sweep import Clock
+    from freepath.results import folder as results
+
+    loaded, known, cases = given
+    load, clock = environment.load(), Clock(started)
     found = results.newest_folder if options.resume else results.new_folder
     path = options.output or found(loaded.name)
-    results.ResultFolder(path, resume=options.resume)  # refuses what it cannot write to
-    failed, sweep = 0, None
-    for number, part in enumerate(parts):
-        if part.failure:
-            told = f"{part.driver.name} cannot be used here: {part.failure}"
-            print(f"freepath: {told}", file=sys.stderr)
-            failed = FAILED
-            continue
+    # refuses what it cannot write to
+    _say_what_was_at_work(results.ResultFolder(path, resume=options.resume))
+    made: list[Sweep] = []
+
+    def make(resume: bool) -> Sweep:
+        more = {"confirm": options.confirm, "clock": clock, "work_group": options.work_group}
+        more |= {"resume": resume or options.resume}
+        if options.shard:
+            more["beside"] = {"shard": "{}/{}".format(*options.shard)}
+        made.append(api.sweep(loaded, path, known=known, cases=cases, **more))
+        return made[-1]
+
+    @contextmanager
+    def watched(part: Part) -> Iterator[Listener]:
         if len(parts) > 1 and not options.json:
             with unread():
                 print(f"{part.driver.name}: {part.driver.title}", flush=True)
-        resumed = options.resume or number > 0 and (path / results.SUMMARY).exists()
-        sweep = api.sweep(
-            loaded,
-            path,
-            known=known,
-            cases=cases,
-            resume=resumed,
-            confirm=options.confirm,
-            clock=clock,
-            work_group=options.work_group,
-        )
-        try:
-            with _shown_progress(console_of(stderr=options.json)) as sweep.listener:
-                worker.run(sweep, part, options.timeout)
-        except KeyboardInterrupt:
-            _say_how_to_resume(sweep)
-            return INTERRUPTED
-        except RunError as error:
-            print(f"freepath: {error}", file=sys.stderr)
-            _say_what_is_missing(part, cases, sweep.folder)
-            failed = FAILED
-    if sweep is None or not sweep.folder.holds_rows:
+        with _shown_progress(console_of(stderr=options.json)) as listener:
+            yield listener
+
+    failed = 0
+    try:
+        for part, sweep in api.each_driver(
+            parts, make, lambda sweep, part: run(sweep, part, options.timeout), watched
+        ):
+            if part.failure:
+                failed = FAILED
+                _say_what_is_missing(part, cases, sweep)
+    except KeyboardInterrupt:
+        if not made:
+            raise
+        _say_how_to_resume(made[-1])
+        return INTERRUPTED
+    if not made or not made[-1].folder.holds_rows:
         return failed
-    return max(_show(options, sweep.folder, cases, load, sweep), failed)
+    return max(_show(options, made[-1].folder, cases, load, made[-1]), failed)
 
 
 def _repeat(options: Namespace, name: str) -> int:
@@ -156,8 +192,19 @@ def _repeat(options: Namespace, name: str) -> int:
     return worst
 
 
-def _say_what_is_missing(part: Part, cases: list[Case], folder: ResultFolder) -> None:
-    """Which cases have no row of a driver whose process ended too early."""
+def _say_what_was_at_work(folder: ResultFolder) -> None:
+    if noted := folder.noted:
+        told = f"the run before was killed at work on {noted}"
+        print(f"freepath: {folder.folder}: {told}", file=sys.stderr)
+
+
+def _say_what_is_missing(part: Part, cases: list[Case], sweep: Sweep | None) -> None:
+    """Why a driver failed, and which cases have no row of it where its process ended too early."""
+    if sweep is None:
+        told = f"{part.driver.name} cannot be used here: {part.failure}"
+        return print(f"freepath: {told}", file=sys.stderr)
+    print(f"freepath: {part.failure}", file=sys.stderr)
+    folder = sweep.folder
     columns = ("case_id", "device", "platform", "driver_version")
     rows = folder.rows() if folder.holds_rows else []
     done = {tuple(row[column] for column in columns) for row in rows}
@@ -174,6 +221,7 @@ def _say_what_is_missing(part: Part, cases: list[Case], folder: ResultFolder) ->
     if rows:
         told = f"go on with the same command and -o {folder.folder} --resume"
         print(f"freepath: {part.driver.name}: {told}", file=sys.stderr)
+    return None
 
 
 def _show(
@@ -204,7 +252,8 @@ def _print(
     for told in folder.read_run().get("inputs") or ():
         console.print(told, highlight=False, markup=False, soft_wrap=True)
     print_tables(console, rows, load, options.baseline)
-    _print_times(console, sweep)
+    if not options.cluster:  # elsewhere, times of several machines are no shares of one
+        _print_times(console, sweep)
     if options.confirm:
         console.print(table.confirmed(folder.confirmed()), highlight=False)
     for written in folder.paths():

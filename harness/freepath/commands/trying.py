@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import shtab
 
-from freepath.commands.arguments import add_device, add_output, add_sigma_t
+from freepath.commands.arguments import add_device, add_output, add_sigma_t, add_timeout
 from freepath.errors import FAILED, INTERRUPTED
 
 if TYPE_CHECKING:
@@ -49,6 +49,7 @@ def add(commands: Any) -> None:
     )
     add_device(trying, "part of the name, platform or driver of the device")
     add_output(trying, "checks, results and report", "try-NAME")
+    add_timeout(trying)
     trying.add_argument(
         "--every-check", action="store_true", help="the slow checks too, which take minutes"
     )
@@ -62,7 +63,7 @@ def execute(options: Namespace) -> int:
     from freepath.commands.common import console_of, own_folder, volume_of
     from freepath.device.selection import first, one_device
     from freepath.extras import candidate
-    from freepath.results.folder import new_folder
+    from freepath.results.folder import new_folder, write
 
     known, tracker, parent = candidate.read(options.tracker, options.like)
     volume = volume_of(options.volume, options.sigma_t or 1.0) if options.volume else None
@@ -92,8 +93,8 @@ def execute(options: Namespace) -> int:
     config = path / candidate.CONFIG
     others = {one.name: one for one in (parent, *candidate.relatives(known, tracker))}
     few = list(others.values())[: candidate.RELATIVES]
-    config.write_text(candidate.sweep_text(tracker, few, volume), "utf-8")
-    return _measure(console, config, (known, tracker, parent), part)
+    write(config, candidate.sweep_text(tracker, few, volume))
+    return _measure(console, config, (known, tracker, parent), part, options.timeout)
 
 
 def _say_verdict(console: Console, outcomes: list[Outcome], kept: Path, stopped: str) -> bool:
@@ -122,7 +123,9 @@ def _say_verdict(console: Console, outcomes: list[Outcome], kept: Path, stopped:
 Trackers = tuple["Catalog", "Tracker", "Tracker"]
 
 
-def _measure(console: Console, config: Path, trackers: Trackers, part: Part) -> int:
+def _measure(
+    console: Console, config: Path, trackers: Trackers, part: Part, timeout_s: float | None
+) -> int:
     """Measure it beside its relatives, write the report and say where it pays."""
     from freepath import api
     from freepath.commands.run import _shown_progress
@@ -135,7 +138,7 @@ def _measure(console: Console, config: Path, trackers: Trackers, part: Part) -> 
     with _shown_progress(console) as listener:
         sweep = api.sweep(config, config.parent, known=known, listener=listener)
         try:
-            worker.run(sweep, part)
+            worker.run(sweep, part, timeout_s)
         except KeyboardInterrupt:
             where = f"its folder is {config.parent}, which `freepath report` shows"
             console.print(f"interrupted with {sweep.ended} of {sweep.total} cases; {where}")

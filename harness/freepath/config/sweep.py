@@ -155,6 +155,10 @@ class Config(Model):
         """Remember the text the config was loaded from, and the axes that were replaced in it."""
         self._document, self._overridden = document, overridden
 
+    def override(self, axes: frozenset[str]) -> None:
+        """Remember axes that were replaced where this was loaded first."""
+        self._overridden = axes
+
     @property
     def path(self) -> Path | None:
         """The file it was loaded from; None for one made in a program."""

@@ -30,6 +30,11 @@ def processor() -> str:
     return names[0] if names else platform.processor() or platform.machine()
 
 
+def host() -> str:
+    """The machine's name, as far as it can be printed."""
+    return "".join(c if c.isprintable() else "?" for c in platform.node())
+
+
 def load() -> float:
     """Runnable processes, averaged over a minute; above the number of cores timings suffer."""
     return round(psutil.getloadavg()[0], 2)
@@ -65,6 +70,7 @@ def describe() -> dict[str, Any]:
     """Host and versions, fit for JSON."""
     return {
         "freepath": __version__,
+        "machine": host(),
         "python": platform.python_version(),
         "packages": packages(),
         "system": f"{platform.system()} {platform.release()}",

@@ -20,7 +20,7 @@ from freepath.compose import catalog as catalogs
 from freepath.compose.catalog import Catalog, Tracker
 from freepath.device.opencl import Device, DeviceInfo
 from freepath.errors import CatalogError
-from freepath.results.folder import CHECKS
+from freepath.results.folder import CHECKS, write
 from freepath.show import answers, table
 from freepath.show.table import Row
 
@@ -123,7 +123,7 @@ def check(
 def keep(outcomes: Sequence[Outcome], folder: Path) -> Path:
     """Write what became of each check into the folder, for the report and for scripts."""
     path = folder / CHECKS
-    path.write_text(json.dumps([asdict(one) for one in outcomes], indent=1), encoding="utf-8")
+    write(path, json.dumps([asdict(one) for one in outcomes], indent=1))
     return path
 
 

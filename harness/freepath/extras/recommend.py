@@ -23,7 +23,7 @@ from freepath.measure import worker
 from freepath.measure.jobs import scenes_of
 from freepath.measure.ladder import Ladder
 from freepath.measure.sweep import Clock, Listener, Sweep
-from freepath.results.folder import RUN, SUMMARY, ResultFolder, Row, read_result
+from freepath.results.folder import RUN, SUMMARY, ResultFolder, Row, read_result, write
 from freepath.scene.volumes.reading import read_volume
 from freepath.show import answers
 from freepath.show.table import failures, number, uncertainty
@@ -94,6 +94,8 @@ class Search:
     """A regular expression that names of trackers match."""
     renderer: Renderer | None = None
     """What is recommended is what it has; all the rest is measured for the ratio."""
+    timeout_s: float | None = None
+    """What --timeout takes."""
     measured: int = 0
     spent_s: float = 0.0
     """Of the budget."""
@@ -257,7 +259,7 @@ class Search:
         seconds = max(LEAST_S, allowed / len(points) - self.beside_s)
         stop = PRECISION[turn] | {"at_most": f"{seconds:.3g} s"}
         config = self.folder / f"round-{turn + 1}.yaml"
-        config.write_text(self.config_text(points, stop), "utf-8")
+        write(config, self.config_text(points, stop))
         before = self.clock.outside_s
         sweep = api.sweep(
             config,
@@ -268,7 +270,7 @@ class Search:
         )
         self.dense = self.dense or self._density(sweep)
         try:
-            worker.run(sweep, self.part)
+            worker.run(sweep, self.part, self.timeout_s)
         finally:
             rows = self._note_all(sweep)
             took = self.clock.outside_s - before
@@ -359,7 +361,7 @@ class Search:
         path = self.folder / CONFIG
         text = self.config_text([one.axes for one in finalists], PRECISION[-1] | {"at_most": "5 s"})
         what = f"{self.estimand} to {100 * self.accuracy:g} %: the first case is the fastest"
-        path.write_text(f"# {what}; the others came next.\n{text}", encoding="utf-8")
+        write(path, f"# {what}; the others came next.\n{text}")
         return path
 
 

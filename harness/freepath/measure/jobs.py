@@ -30,7 +30,7 @@ def scenes_of(cases: Iterable[Case], folders: Iterable[Path]) -> dict[Case, Scen
     scenes: dict[str, Scene] = {}
     found = {}
     for case in cases:
-        key = str(case.medium.as_dict())
+        key = case.scene
         # what cannot be used is reported before anything runs
         _check_memory(case)
         if key not in scenes:
@@ -132,4 +132,4 @@ class Job:
     @property
     def place(self) -> tuple[str, ...]:
         """Device and medium: jobs of one place are measured in turns."""
-        return self.device.info.label, str(self.case.medium.as_dict())
+        return self.device.info.label, self.case.scene

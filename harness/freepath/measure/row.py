@@ -12,6 +12,7 @@ import numpy as np
 from freepath.cases.plan import Case
 from freepath.compose.catalog import Tracker
 from freepath.config.axes import AXES, label
+from freepath.device import environment
 from freepath.device.opencl import DeviceInfo
 from freepath.measure.rounds import Measurement
 from freepath.measure.stats import Accuracy, accuracy, relative_half_width
@@ -42,6 +43,7 @@ def base_row(case: Case, device: DeviceInfo, run_id: str) -> dict[str, Any]:
         "device": device.name,
         "platform": device.platform,
         "driver_version": device.driver_version,
+        "host": environment.host(),
         "tracker": case.tracker,
         "tracker_label": label(case.point["tracker"]),
         "channels": case.medium.channel_count,

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import time
 import uuid
-from collections.abc import Iterable
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -28,7 +29,9 @@ from freepath.measure.row import measured_row, round_rows
 from freepath.measure.runner import KernelData
 from freepath.measure.stopping import Rule
 from freepath.results.folder import ResultFolder
+from freepath.scene.volumes.files import COPIES
 
+UNDER_WAY = "running, or killed"
 TWICE = 2
 """So often a process may end at a case before that is given up: once may have been an accident."""
 
@@ -62,8 +65,14 @@ class Listener:
     def row(self, row: dict[str, Any]) -> None:
         """A row was written."""
 
+    def rounds(self, *kinds: list[dict[str, Any]]) -> None:
+        """The rows of rounds, and of what was confirmed, of the row that follows; if asked for."""
+
     def progress(self, done: float, total: int, what: str) -> None:
         """So many cases are done, of so many, and this is being done."""
+
+    def look(self, number: int) -> None:
+        """Told a few times a second of a sweep that is watched: the number of the job at work."""
 
 
 @dataclass
@@ -81,6 +90,14 @@ class Sweep:
     """Whether the error that each case predicts is measured as well."""
     work_group: int | None = None
     """Work-items of a group; None for what is best known or found."""
+    beside: dict[str, Any] = field(default_factory=dict)
+    """What run.json says of this session beside the rest."""
+    files: dict[str, Path] = field(default_factory=dict)
+    """Copies of files that the config names, by these names: where another machine has them."""
+    tells_rounds: bool = False
+    """Whether the listener hears of the rows of rounds too."""
+    elsewhere: Callable[[list[list[Job]]], None] | None = None
+    """Measures groups of jobs on other machines, and has their rows written here."""
     run_id: str = field(default_factory=lambda: uuid.uuid4().hex[:12])
     total: int = 0
     ended: int = 0
@@ -105,7 +122,8 @@ class Sweep:
         if self.config.render:
             openimageio()  # or the pictures would be missed only when all is measured
         self.total = self.total if self.deaths else len(self.cases) * len(self.devices)
-        self._progress(0.0, "preparing scenes")
+        self.progress(0.0, "preparing scenes")
+        COPIES.update(self.files)
         scenes = scenes_of(self.cases, self.config.search_path)
         jobs = [
             Job.of(case, device, scenes[case], self.catalog, self.run_id)
@@ -126,11 +144,14 @@ class Sweep:
         session = run_file.session_of(self.run_id, self.devices, self.total)
         ended = "failed"
         try:
-            run_file.write(self.folder, facts, session | {"ended": "running, or killed"})
+            run_file.write(self.folder, facts, session | self.beside | {"ended": UNDER_WAY})
             for device in self.devices:
                 device.compiler_log = self.folder.folder.resolve() / "compiler.log"
-            for group in self._groups(left):
-                self._run(group)
+            if self.elsewhere:
+                self.elsewhere(self.groups(left))
+            else:
+                for group in self.groups(left):
+                    self._run(group)
             ended = "complete"
         except KeyboardInterrupt:
             ended = "interrupted"
@@ -139,7 +160,7 @@ class Sweep:
             for device in self.devices:
                 device.compiler_log = None
             ending = {"ended": ended, **self.clock.as_dict()}
-            run_file.write(self.folder, facts, session | ending)
+            run_file.write(self.folder, facts, session | self.beside | ending)
             self.folder.close()
 
     def _is_whole(self, row: dict[str, str]) -> bool:
@@ -149,7 +170,7 @@ class Sweep:
         rays = self.cases[0].rays  # all cases of a config fly the same
         return not self.config.render or are_there(self.folder.folder, row, rays)
 
-    def _groups(self, jobs: list[Job]) -> list[list[Job]]:
+    def groups(self, jobs: list[Job]) -> list[list[Job]]:
         """Jobs that are measured in turns: those of a scene on a device.
 
         Those at which a process ended come alone, and last: if one ends it again, it takes none of
@@ -160,32 +181,48 @@ class Sweep:
             found.setdefault(job if self._deaths_at(job) else job.place, []).append(job)
         return list(found.values())
 
-    def _progress(self, under_way: float, what: str) -> None:
-        """`under_way` is how many cases' worth of those at work is done."""
+    def progress(self, under_way: float, what: str) -> None:
+        """Report it; `under_way` is how many cases' worth of those at work is done."""
         self.listener.progress(self.ended + under_way, self.total, what)
 
     def _deaths_at(self, job: Job) -> list[dict[str, str]]:
         """How a process of this run ended, each time one did while this case was at work."""
         return self.deaths.get(self._numbers[job], [])
 
+    def given_up(self, job: Job) -> bool:
+        """Tell whether processes ended at a job so often that its row says so, and write that."""
+        if len(self._deaths_at(job)) < TWICE:
+            return False
+        *_, last = self._deaths_at(job)
+        reason = f"{last['reason']}, also when it was tried again alone"
+        self.finish(job.row | last | {"reason": reason})
+        return True
+
+    def died(self, job: Job) -> bool:
+        """Whether a process of this run ended while this case was at work."""
+        return bool(self._deaths_at(job))
+
+    def died_at(self, job: Job, verdict: dict[str, str]) -> None:
+        """Note how a process ended, as the row of the job at work would say."""
+        self.deaths.setdefault(self._numbers[job], []).append(verdict)
+
     def _work_at(self, job: Job) -> None:
         self.state[1] = self._numbers[job]
+        self.folder.note(job.case.name)
 
     def _run(self, jobs: list[Job]) -> None:
         """Build and measure jobs side by side; each row is written as it ends."""
         ready = []
         for job in jobs:
-            if len(self._deaths_at(job)) >= TWICE:
-                *_, last = self._deaths_at(job)
-                reason = f"{last['reason']}, also when it was tried again alone"
-                self._finish(job, job.row | last | {"reason": reason})
-            elif job.timed is None:
-                self._finish(job, job.row)
+            if self.given_up(job):
+                continue
+            if job.timed is None:
+                self.finish(job.row)
             else:
                 ready.append(job)
         data: dict[tuple[str, str], KernelData] = {}
         for place, job in enumerate(ready, 1):
-            self._progress(0.0, f"building {place}/{len(ready)}")
+            self.progress(0.0, f"building {place}/{len(ready)}")
             self._work_at(job)
             try:
                 self._prepare(job, data)
@@ -241,7 +278,7 @@ class Sweep:
 
     def _measure(self, jobs: list[Job]) -> None:
         by_bench = {job.bench: job for job in jobs}
-        self._progress(0.0, "computing references")
+        self.progress(0.0, "computing references")
         for job in jobs:
             # now, and not between two rounds
             self._work_at(job)
@@ -262,7 +299,7 @@ class Sweep:
                 self._measured(by_bench[bench])
             open_ones = [b for b in by_bench if not b.measurement.stopped]
             under_way = sum(b.progress for b in open_ones)
-            self._progress(under_way, f"measuring {len(open_ones)} cases")
+            self.progress(under_way, f"measuring {len(open_ones)} cases")
         self._render_at_equal_time()
 
     def _render_at_equal_time(self) -> None:
@@ -270,7 +307,7 @@ class Sweep:
         shots, self._shots = self._shots, []
         if not shots:
             return
-        self._progress(0.0, "pictures at equal time")
+        self.progress(0.0, "pictures at equal time")
         try:
             told = equal_time.render(self.folder.folder, shots, self.folder.rows())
         except RunError as error:
@@ -296,7 +333,7 @@ class Sweep:
             except RunError as error:
                 return self._fail(job, error)
             self.clock.device_s += found.time_device_s - row["time_device_s"]
-        return self._finish(job, row, round_rows(row, found), confirmed)
+        return self.finish(row, list(round_rows(row, found)), confirmed)
 
     def _fail(self, job: Job, error: FreepathError | MemoryError) -> None:
         """A case that cannot be built or run is a row; the others go on."""
@@ -305,10 +342,12 @@ class Sweep:
         status = "build_failed" if isinstance(error, BuildError) else "run_failed"
         if isinstance(error, DriverLimitError):
             status = "skipped"
-        self._finish(job, job.row | {"status": status, "reason": first_error(error)})
+        self.finish(job.row | {"status": status, "reason": first_error(error)})
 
-    def _finish(self, job: Job, row: dict[str, Any], *further: Iterable[dict[str, Any]]) -> None:
+    def finish(self, row: dict[str, Any], *further: list[dict[str, Any]]) -> None:
+        """Write a row with those of its rounds and of what was confirmed, and report it."""
         self.folder.append(row, *further)
         self.ended += 1
-        self.clock.device_s += row["time_device_s"] or 0.0
+        self.clock.device_s += float(row["time_device_s"] or 0.0)
+        self.listener.rounds(*further)
         self.listener.row(row)

@@ -88,6 +88,7 @@ def _ends_early(
                 except (EOFError, ConnectionResetError):
                     break
                 since, number = state[:2]
+                sweep.listener.look(int(number))
                 limit = timeout_s or limit_of(sweep, int(number), driver)
                 if since and time.monotonic() - since > limit:
                     hung = limit
@@ -167,6 +168,10 @@ class Telling(Listener):
 
     def row(self, row: dict[str, Any]) -> None:
         self.tell("row", (row,))
+
+    def rounds(self, *kinds: list[dict[str, Any]]) -> None:
+        if self._sweep.tells_rounds:
+            self.tell("rounds", kinds)
 
     def progress(self, done: float, total: int, what: str) -> None:
         what, now = what.partition(" ")[0], time.monotonic()

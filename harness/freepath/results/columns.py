@@ -40,6 +40,7 @@ reason str - why the status is not `ok`; with `ok` a remark, such as paths at th
 device str - its name
 platform str - the name of the device's platform
 driver_version str - of the device
+host str - the name of the machine that measured the row
 tracker str - its name; its parameters are in `params`
 tracker_label str - its name with the parameters that are not their defaults
 estimand str - what the case estimates

@@ -11,19 +11,21 @@ import os
 import re
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from freepath.errors import FreepathError, ResultError
+from freepath.errors import FreepathError, ResultError, printable
 from freepath.results import reading
 from freepath.results.columns import COLUMNS, CONFIRM_COLUMNS, SAMPLE_COLUMNS, TEXTS
 
-SCHEMA_VERSION = 5
+SCHEMA_VERSION = 6
 SUMMARY, SAMPLES, CONFIRM, RUN = "summary.csv", "samples.csv", "confirm.csv", "run.json"
+LONGEST_NAME = 4096
+"""Bytes of a case's name."""
 CHECKS = "checks.json"
 """What became of the checks of a tracker on trial."""
-LOCK = ".lock"
+LOCK, AT_WORK = ".lock", ".at-work"
 RESULTS = Path("results")
 STAMP = "%Y%m%d-%H%M%S"
 PLACE = ("case_id", "device", "platform")
@@ -54,7 +56,7 @@ class ResultFolder:
         self._resume = resume
         self._confirm = confirm
         self._lock: Any = None
-        self._locked = 0
+        self._locked, self._at_work = 0, -1
         try:
             if folder.exists() and not folder.is_dir():
                 raise FreepathError(f"{folder}: is a file, expected a folder for the results")
@@ -92,6 +94,8 @@ class ResultFolder:
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
             self._acquire()
+            flags = os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW
+            self._at_work = os.open(self.folder / AT_WORK, flags, 0o666)
             old = self.rows() if self._resume else []
             predicted = self._old(CONFIRM, CONFIRM_COLUMNS)
             needed = {_of(row, SESSION) for row in predicted} if self._confirm else None
@@ -99,12 +103,12 @@ class ResultFolder:
             sessions = {_of(row, SESSION) for row in kept}
             rounds = self._old(SAMPLES, SAMPLE_COLUMNS)
             reading.agree(self.folder / SUMMARY, old, rounds, SESSION)
-            self._rewrite(SUMMARY, COLUMNS, kept)
+            self.rewrite(SUMMARY, COLUMNS, kept)
             rounds = [row for row in rounds if _of(row, SESSION) in sessions]
-            self._rewrite(SAMPLES, SAMPLE_COLUMNS, rounds)
+            self.rewrite(SAMPLES, SAMPLE_COLUMNS, rounds)
             if predicted or self._confirm:
                 stay = [row for row in predicted if _of(row, SESSION) in sessions]
-                self._rewrite(CONFIRM, CONFIRM_COLUMNS, stay)
+                self.rewrite(CONFIRM, CONFIRM_COLUMNS, stay)
         except OSError as error:
             raise FreepathError(f"{self.folder}: cannot be written to: {error.strerror}") from error
         return {key_of(row) for row in kept if stands(row)}
@@ -140,16 +144,34 @@ class ResultFolder:
     def close(self) -> None:
         """Let others write here."""
         if self._lock:
+            if self._at_work >= 0:
+                os.close(self._at_work)
+                self._at_work = -1
+            (self.folder / AT_WORK).unlink(missing_ok=True)
             (self.folder / LOCK).unlink(missing_ok=True)
             self._lock.release()
             self._lock = None
+
+    def note(self, case: str) -> None:
+        """Note which case is at work, for who goes on where everything was killed."""
+        with suppress(OSError):  # a full disk is told where a row is written
+            os.pwrite(self._at_work, case.encode().ljust(LONGEST_NAME), 0)
+
+    @property
+    def noted(self) -> str:
+        """The case that was at work when a run here was killed; '' where none was, or it ended."""
+        with suppress(OSError):
+            file = os.open(self.folder / AT_WORK, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
+            with open(file, "rb") as opened:
+                return printable(opened.read(LONGEST_NAME).decode(errors="replace").strip())
+        return ""
 
     def _old(self, name: str, columns: tuple[str, ...]) -> list[Row]:
         """The rows of a file of the run that is gone on with."""
         path = self.folder / name
         return read_rows(path, columns) if self._resume and path.exists() else []
 
-    def _rewrite(self, name: str, columns: tuple[str, ...], rows: list[Row]) -> None:
+    def rewrite(self, name: str, columns: tuple[str, ...], rows: list[Row]) -> None:
         """Replace a file in one step, so that an interruption leaves the old or the new one."""
         with replacing(self.folder / name) as file:
             _writer(file, columns).writeheader()
@@ -169,7 +191,7 @@ class ResultFolder:
         self._append(SUMMARY, COLUMNS, [row])
 
     def _append(self, name: str, columns: tuple[str, ...], rows: Iterable[Mapping]) -> None:
-        texts = [{column: _text(row[column]) for column in columns} for row in rows]
+        cells = [texts(row, columns) for row in rows]
         flags = os.O_WRONLY | os.O_APPEND | os.O_NOFOLLOW  # one that was removed is not made anew
         try:
             with open(
@@ -179,7 +201,7 @@ class ResultFolder:
                 encoding="utf-8",
                 opener=lambda path, _: os.open(path, flags),
             ) as file:
-                _writer(file, columns).writerows(texts)
+                _writer(file, columns).writerows(cells)
                 _flush(file)
         except OSError as error:
             raise _stopped(self.folder / name, error) from error
@@ -201,8 +223,7 @@ class ResultFolder:
 
     def write_log(self, name: str, text: str) -> Path:
         """Write a compiler's log beside the rows."""
-        with replacing(self.folder / name) as file:
-            file.write(text)
+        write(self.folder / name, text)
         return self.folder / name
 
     def rows(self) -> list[Row]:
@@ -240,13 +261,14 @@ def _writer(file: Any, columns: tuple[str, ...]) -> csv.DictWriter:
 
 
 @contextmanager
-def replacing(path: Path) -> Iterator[Any]:
-    """A file to write text into that takes the place of `path` in one step, once all is written.
+def replacing(path: Path, mode: str = "w") -> Iterator[Any]:
+    """A file to write text into (bytes: `wb`) that takes the place of `path` once all is written.
 
     A symbolic link there is replaced, and never followed: a folder may come from somebody else.
     """
+    encoding, newline = (None, None) if "b" in mode else ("utf-8", "")
     with tempfile.NamedTemporaryFile(
-        "w", dir=path.parent, prefix=".", encoding="utf-8", newline="", delete=False
+        mode, dir=path.parent, prefix=".", encoding=encoding, newline=newline, delete=False
     ) as file:
         try:
             os.fchmod(file.fileno(), 0o666 & ~UMASK)
@@ -256,6 +278,12 @@ def replacing(path: Path) -> Iterator[Any]:
         except BaseException:
             os.unlink(file.name)
             raise
+
+
+def write(path: Path, text: str) -> None:
+    """Write a text file in the place of what is there."""
+    with replacing(path) as file:
+        file.write(text)
 
 
 def _stopped(path: Path, error: OSError) -> ResultError:
@@ -280,12 +308,23 @@ def key_of(row: Mapping[str, Any]) -> tuple[str, ...]:
     return _of(row, KEY)
 
 
-def _text(value: Any) -> Any:
+def texts(row: Mapping[str, Any], columns: tuple[str, ...]) -> dict[str, str]:
+    """The cells of a row; texts command neither a terminal nor a spreadsheet."""
+    cells = {column: _text(row[column]) for column in columns}
+    return cells | {name: no_formula(printable(cells[name])) for name in TEXTS & cells.keys()}
+
+
+def no_formula(text: str) -> str:
+    """A text that no spreadsheet takes for a formula."""
+    return f"'{text}" if text[:1] in ("=", "+", "-", "@", "\t", "\r") else text
+
+
+def _text(value: Any) -> str:
     """None is empty; floats in full; inf as the word that every reader of CSV knows."""
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return ""
     # of numpy's floats too, whose repr names their type
-    return repr(float(value)) if isinstance(value, float) else value
+    return repr(float(value)) if isinstance(value, float) else str(value)
 
 
 def read_rows(path: Path, columns: tuple[str, ...] = COLUMNS) -> list[Row]:

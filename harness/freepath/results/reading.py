@@ -6,8 +6,9 @@ import csv
 import io
 import json
 import math
+import re
 from collections import defaultdict
-from collections.abc import Collection, Iterable
+from collections.abc import Callable, Collection, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +40,7 @@ STATUSES: tuple[str, ...] = (
     "crashed",
 )
 STATUSES += ("mismatch",)
+CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f]")
 LARGEST = 1e300
 """Of a cell; beyond it squares are no numbers."""
 PARTS = 5
@@ -62,36 +64,40 @@ def rows(path: Path, columns: tuple[str, ...], texts: Collection[str], version: 
     except OSError as error:
         raise FreepathError(f"{path}: cannot be read: {error.strerror}") from error
     whole = text.endswith("\n")
-    reader = csv.DictReader(io.StringIO(text, newline=""))
-    found = []
+    reader = csv.reader(io.StringIO(text, newline=""))
+    found, counts = [], []
     try:
-        if tuple(reader.fieldnames or ()) != columns:
+        if tuple(next(reader, ())) != columns:
             raise FreepathError(f"{path}: its columns are not those of schema version {version}")
-        for cells in reader:
-            row = Row(cells)
+        for cells in filter(None, reader):
+            row = Row(zip(columns, cells, strict=False))
             row.line = reader.line_num
             found.append(row)
+            counts.append(len(cells))
     except csv.Error as error:
         raise FreepathError(f"{path}:{reader.line_num}: cannot be read: {error}") from error
     if found and not whole:
         found.pop()
-    for row in found:
-        _check(path, row, columns, texts)
+    for row, count in zip(found, counts, strict=False):
+        if count != len(columns):
+            wrong = "more" if count > len(columns) else "fewer"
+            told = f"expected {len(columns)} cells, as the first line has, got {wrong}"
+            raise FreepathError(f"{path}:{row.line}: {told}")
+    for place, name in enumerate(columns, 1):
+        _check(path, found, f"column {place}, {name}", name, _text if name in texts else _number)
     return found
 
 
-def _check(path: Path, row: Row, columns: tuple[str, ...], texts: Collection[str]) -> None:
-    if None in row or None in row.values():
-        raise FreepathError(
-            f"{path}:{row.line}: expected {len(columns)} cells, as the first line has, got "
-            f"{'more' if None in row else 'fewer'}"
-        )
-    for place, name in enumerate(columns, 1):
-        wrong = _text(name, row[name]) if name in texts else _number(name, row[name])
-        if not wrong and not row[name]:
-            wrong = _missing(row, name)
-        if wrong:
-            raise FreepathError(f"{path}:{row.line}: column {place}, {name}: {wrong}")
+def _check(
+    path: Path, found: list[Row], where: str, name: str, wrong_of: Callable[[str, str], str]
+) -> None:
+    """Look at each text of a column once, and at each row only where that is not enough."""
+    wrong = {text: wrong_of(name, text) for text in {row[name] for row in found}}
+    if not any(wrong.values()) and "" not in wrong:
+        return
+    for row in found:
+        if why := wrong[row[name]] or (not row[name] and _missing(row, name)):
+            raise FreepathError(f"{path}:{row.line}: {where}: {why}")
 
 
 def _missing(row: Row, name: str) -> str:
@@ -107,7 +113,7 @@ def _missing(row: Row, name: str) -> str:
 
 def _text(name: str, text: str) -> str:
     """What is wrong with a text; '' where nothing is."""
-    if any(c < " " and c not in "\n\r\t" or "\x7f" <= c < "\xa0" for c in text):
+    if CONTROL.search(text):
         return f"holds a control character: {text!r}"
     if name == "status" and text not in STATUSES:
         return f"expected one of {', '.join(STATUSES)}, got '{text}'"

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from rich.markup import escape
 from rich.table import Table
-from rich.text import Text
 
 from freepath import config
 from freepath.compose.catalog import Catalog, Parameter
@@ -163,7 +163,7 @@ def table_of(records: list[Record]) -> Table:
     for record in records:
         (_, name), *rest = record.items()
         lines = [line for key, value in rest for line in _lines(key, value)]
-        table.add_row(Text(name), Text("\n".join(lines)))
+        table.add_row(escape(name), escape("\n".join(lines)))
     return table
 
 

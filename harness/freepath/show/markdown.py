@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+from freepath.errors import printable
+
 
 def text_of(text: str) -> str:
     """A text that Markdown shows as it is, in a line."""
+    text = printable(text)
     special = {c: f"\\{c}" for c in "\\`*_[]<>|#"} | {"\n": " ", "\r": " "}
     return text.translate(str.maketrans(special))
 

@@ -56,16 +56,18 @@ def short(value: float | None, digits: int = 3) -> str:
 
 
 def by_device(rows: Iterable[Row]) -> dict[str, list[Row]]:
-    """Rows by the name of their device with its platform and driver."""
-    found: dict[str, list[Row]] = defaultdict(list)
+    """Rows by the name of their device with its platform and driver, and host if of several."""
+    rows, found = list(rows), defaultdict(list)
+    several = len({row["host"] for row in rows}) > 1
     for row in rows:
-        found[f"{row['device']} ({row['platform']} {row['driver_version']})"].append(row)
+        where = f" on {row['host']}" if several else ""
+        found[f"{row['device']} ({row['platform']} {row['driver_version']}){where}"].append(row)
     return found
 
 
 def group_key(row: Row) -> tuple[str, ...]:
     """Cases that answer the same question on the same device."""
-    columns = ("device", "platform", "driver_version", "estimand", "medium", "rays")
+    columns = ("device", "platform", "driver_version", "host", "estimand", "medium", "rays")
     columns += ("light", "scatterings")
     return tuple(row[column] for column in columns)
 

@@ -8,6 +8,9 @@ from pathlib import Path
 
 from freepath.errors import VolumeError
 
+COPIES: dict[str, Path] = {}
+"""What is taken in the place of files of these names, which another machine has."""
+
 
 def find_file(name: str | Path, search_path: Iterable[str | Path] = ()) -> Path:
     """Return the first file of that name in the places where it may be.
@@ -16,6 +19,8 @@ def find_file(name: str | Path, search_path: Iterable[str | Path] = ()) -> Path:
     `search_path` (the config's own), of $FREEPATH_VOLUMES, and in the current folder. Raises
     VolumeError where it is in none of them, is a folder, or cannot be read.
     """
+    if str(name) in COPIES:
+        return _readable(COPIES[str(name)])
     try:
         wanted = Path(name).expanduser()
     except RuntimeError as error:  # of a ~ with the name of nobody

@@ -137,7 +137,8 @@ def scenes(run: Run) -> dict[Key, list[Key]]:
     found: dict[Key, list[Key]] = defaultdict(list)
     for key, row in run.rows.items():
         if len(run.times.get(key, ())) > 1:
-            found[row["device"], row["platform"], row["medium"], row["rays"]].append(key)
+            place = row["device"], row["platform"], row["host"]
+            found[(*place, row["medium"], row["rays"])].append(key)
     return found
 
 

@@ -15,6 +15,7 @@ from typing import Any
 from rich.markup import escape
 from rich.table import Table
 
+from freepath.results.folder import no_formula
 from freepath.show import markdown
 from freepath.show.compare.judging import REGRESSIONS, VERDICTS, Judged
 from freepath.show.table import short
@@ -180,7 +181,10 @@ def as_csv(names: Sequence[str], results: Sequence[Sequence[Judged]]) -> str:
     writer = csv.DictWriter(file, ("contender", *COLUMNS), lineterminator="\n")
     writer.writeheader()
     for name, judged in zip(names, results, strict=True):
-        writer.writerows({"contender": name} | record(one) for one in judged)
+        for one in judged:
+            row = {"contender": name} | record(one)
+            texts = {key: no_formula(cell) for key, cell in row.items() if isinstance(cell, str)}
+            writer.writerow(row | texts)
     return file.getvalue()
 
 

@@ -9,11 +9,13 @@ moved together is separated: within what a machine may drift it is no case's fau
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import stats
+from scipy.special import stdtr, stdtrit
 
 from freepath.show.compare.moderation import moderated
 from freepath.show.compare.pairing import Key, Run, Side, scenes, table_of
@@ -56,7 +58,7 @@ class Change:
     @property
     def width(self) -> float:
         """Half the 95 % interval."""
-        return float(stats.t.ppf(0.975, self.freedom)) * self.stderr
+        return float(stdtrit(self.freedom, 0.975)) * self.stderr
 
     def within(self, limit: float) -> bool:
         """Whether the interval, and what all cases share, is no further from 0 than a limit."""
@@ -68,8 +70,8 @@ class Change:
         By tests at that level; no less than what this interval holds, as a change is known to be
         no larger only by that.
         """
-        quantiles = stats.t.ppf([1.0 - level, SURE], self.freedom)
-        power = limit + float(quantiles.sum()) * self.stderr
+        quantiles = float(stdtrit(self.freedom, 1.0 - level) + stdtrit(self.freedom, SURE))
+        power = limit + quantiles * self.stderr
         return max(power, abs(self.log_ratio) + self.width)
 
     def runs_to_show(self, change: float, level: float, runs: int) -> int | None:
@@ -77,18 +79,25 @@ class Change:
 
         From the error that so many `runs` have; None where MOST_RUNS would not do.
         """
-        counts = np.arange(LEAST_RUNS, MOST_RUNS + 1)
-        needed = stats.t.ppf(1.0 - level, 2 * counts - 2) + stats.t.ppf(SURE, 2 * counts - 2)
-        enough = needed * self.stderr * np.sqrt(runs / counts) <= change
+        counts, needed = _needed(level)
+        enough = needed * self.stderr * math.sqrt(runs) <= change
         return int(counts[enough.argmax()]) if enough.any() else None
 
     def p_beyond(self, limit: float) -> tuple[float, float]:
         """One-sided p-values that the ratio is no more than +limit, no less than -limit (logs)."""
         if not self.stderr > 0:
             return float(self.log_ratio <= limit), float(self.log_ratio >= -limit)
-        slower = stats.t.sf((self.log_ratio - limit) / self.stderr, self.freedom)
-        faster = stats.t.sf((-self.log_ratio - limit) / self.stderr, self.freedom)
+        slower = stdtr(self.freedom, (limit - self.log_ratio) / self.stderr)
+        faster = stdtr(self.freedom, (limit + self.log_ratio) / self.stderr)
         return float(slower), float(faster)
+
+
+@functools.lru_cache
+def _needed(level: float) -> tuple[np.ndarray, np.ndarray]:
+    """Numbers of runs per side, and the standard errors of one run that they can tell apart."""
+    counts = np.arange(LEAST_RUNS, MOST_RUNS + 1)
+    freedom = 2.0 * counts - 2.0
+    return counts, (stdtrit(freedom, 1.0 - level) + stdtrit(freedom, SURE)) / np.sqrt(counts)
 
 
 def _quiet(table: np.ndarray) -> np.ndarray:
@@ -128,12 +137,17 @@ def _effects(run: Run) -> dict[Key, tuple[Effect, Key]]:
 
 def _effect(values: np.ndarray) -> Effect:
     """The QUIET quantile, and its variance by leaving out one batch of neighbours after another."""
-    batches = np.array_split(values, min(BATCHES, len(values)))
-    count = len(batches)
-    without = [np.concatenate(batches[:i] + batches[i + 1 :]) for i in range(count)]
-    levels = np.array([np.quantile(rest, QUIET) for rest in without])
-    variance = (count - 1.0) ** 2 / count * float(levels.var(ddof=1))
-    return Effect(float(np.quantile(values, QUIET)), variance, count - 1.0)
+    count = min(BATCHES, len(values))
+    levels = _quiet(np.where(_left_out(len(values), count), np.nan, values))
+    variance = (count - 1.0) ** 2 / count * float(levels[:-1].var(ddof=1))
+    return Effect(float(levels[-1]), variance, count - 1.0)
+
+
+@functools.lru_cache
+def _left_out(length: int, count: int) -> np.ndarray:
+    """Which of so many values are in each of `count` batches; in the last row none."""
+    places = np.array_split(np.arange(length), count)
+    return np.array([np.isin(np.arange(length), batch) for batch in [*places, []]])
 
 
 def pooled(side: Side) -> dict[Key, Effect]:

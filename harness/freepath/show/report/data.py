@@ -118,16 +118,18 @@ def _checks(result: Path) -> list[dict[str, Any]]:
     return [one for one in known if {"name", "status", "text"} <= one.keys()]
 
 
-def _device(row: Row) -> tuple[str, str, str]:
-    return row["device"], row["platform"], row["driver_version"]
+def _device(row: Row) -> tuple[str, str, str, str]:
+    return row["device"], row["platform"], row["driver_version"], row["host"]
 
 
 def _devices(rows: list[tuple[str, Row]]) -> dict[tuple, str]:
     """A label for each device of each result, no longer than it takes to tell them apart."""
     found = dict.fromkeys((name, _device(row)) for name, row in rows)
     short = {key: key[1][0] for key in found}
-    if len(set(short.values())) < len({device for _, device in found}):
+    if len(set(short.values())) < len({device[:3] for _, device in found}):
         short = {key: f"{key[1][0]} ({key[1][1]} {key[1][2]})" for key in found}
+    if len({device[3] for _, device in found}) > 1:
+        short = {key: f"{label} on {key[1][3]}" for key, label in short.items()}
     if len(set(short.values())) < len(found):
         short = {key: f"{key[0]}: {label}" for key, label in short.items()}
     return short

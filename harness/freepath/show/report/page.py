@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import html
 import json
 import os
@@ -14,6 +15,7 @@ from typing import Any
 
 from freepath import __version__
 from freepath.results.columns import OF_SUMMARY
+from freepath.results.folder import write
 from freepath.show.report.charts import ACROSS, CHARTS, useful
 from freepath.show.report.data import Report
 from freepath.show.report.renders import panels
@@ -164,7 +166,7 @@ def _asset(name: str) -> str:
 
 
 def _library() -> str:
-    """Vega, Vega-Lite and Vega-Embed in one script; made once, as that takes seconds."""
+    """Vega, Vega-Lite and Vega-Embed in one script; kept behind its hash: it takes long to make."""
     import vl_convert
 
     folder = os.environ.get("FREEPATH_CACHE")
@@ -173,12 +175,12 @@ def _library() -> str:
 
         folder = platformdirs.user_cache_dir("freepath")
     path = Path(folder) / f"vega-{vl_convert.__version__}.js"
-    with contextlib.suppress(OSError):
-        return path.read_text("utf-8")
+    with contextlib.suppress(OSError, UnicodeDecodeError):
+        seal, _, text = path.read_text("utf-8").partition("\n")
+        if seal == hashlib.sha256(text.encode()).hexdigest():
+            return text
     text = vl_convert.javascript_bundle().replace("</script", "<\\/script")
     with contextlib.suppress(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)
-        part = path.with_suffix(f".{os.getpid()}")
-        part.write_text(text, encoding="utf-8")
-        part.replace(path)
+        write(path, f"{hashlib.sha256(text.encode()).hexdigest()}\n{text}")
     return text
