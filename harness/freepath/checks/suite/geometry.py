@@ -6,17 +6,15 @@ import itertools
 from typing import Any
 
 import numpy as np
-from scipy import stats
 
 from freepath.checks.cases import check_samples
-from freepath.checks.identities import check_clean
+from freepath.checks.identities import check_clean, check_each_ray, largest_events
 from freepath.checks.rig import Rig
 from freepath.checks.suite.common import UPWARD, VOXELS, Checks, everyone, knows_depth, unit, voxels
 from freepath.checks.suite.thickness import WITHIN_1
 from freepath.checks.truth import MajorantAlongRays
-from freepath.checks.verdict import demand, require
+from freepath.checks.verdict import demand
 from freepath.compose.catalog import Tracker
-from freepath.measure.stats import Moments
 
 Lines = tuple[np.ndarray, np.ndarray]
 UNITS = {"1e-6": 1e-6, "1e6": 1e6}
@@ -82,16 +80,8 @@ def special(rig: Rig, alpha: float, tracker: Tracker, kind: str) -> None:
     samples = flight.record(2048)
     check_samples(flight, samples, alpha / 2)
     if samples.round.variance and tracker.unbiased:
-        each_ray(samples.round.moments, flight.reference(), alpha / 2)
-
-
-def each_ray(moments: Moments, expected: np.ndarray, alpha: float) -> None:
-    """z-tests of single rays; one of hardly a collision has no normal distribution."""
-    events = 2.0 / moments.count
-    error = np.sqrt(moments.variance / moments.count + events**2)
-    deviation = np.maximum(np.abs(moments.mean - expected) - events, 0.0)
-    p_values = 2.0 * stats.norm.sf(deviation / error)
-    require(p_values, alpha, "mean of a ray", moments.mean, expected)
+        events = largest_events(samples.score)
+        check_each_ray(samples.round.moments, flight.reference(), events, alpha / 2)
 
 
 @checks.hard("geometry/no-length", everyone)
