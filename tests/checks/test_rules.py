@@ -8,6 +8,7 @@ import pytest
 from freepath.checks import cases
 from freepath.checks.identities import (
     NO_EVENTS,
+    _p_values,
     check_clean,
     check_empty,
     check_independence,
@@ -162,12 +163,15 @@ def test_a_bias_of_all_rays_is_found_in_their_sum():
 
 
 def test_what_did_not_come_explains_a_loss_and_no_gain():
-    found, expected = np.full((RAYS, COUNT), 1.0), np.ones(RAYS)
-    found[0, 0] = 50.0  # of a mean of which 1 in COUNT scores is 50, in one ray
-    assert rejected_means([(found, expected + 50.0 / COUNT)], ALPHA) == 0
-    below, above = largest_events(found)
-    assert below < 0.1
-    assert above > 48.0
+    found = np.ones((RAYS, COUNT))
+    found[0, 0] = 50.0
+    events = largest_events(found)
+    assert events[0] < 0.1
+    assert events[1] > 48.0
+    error = np.full(2, found[0].var() / COUNT)
+    loss, gain = _p_values(np.array([-0.2, 0.2]), error, events / COUNT)
+    assert gain < 1e-10
+    assert loss > 1e-3
 
 
 @pytest.mark.parametrize("shared", [0.3, 1.0])
