@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from freepath.checks.rig import Flight
 from freepath.scene import majorants
+from freepath.scene.media.base import crossings, partition
 
 Array = NDArray[np.float64]
 Expected = tuple[Array | None, Array]
@@ -22,19 +23,65 @@ class AlongRays:
     """sigma_t at midpoints of equal intervals of each ray, with the majorant and control there."""
 
     def __init__(self, flight: Flight):
-        segments = flight.segments
+        self.flight, segments = flight, flight.segments
         self.step = segments[:, 6:] / POINTS
         t = (np.arange(POINTS) + 0.5) * self.step
         points = segments[:, None, :3] + t[..., None] * segments[:, None, 3:6]
         self.sigma = flight.medium.sigma_t(points.reshape(-1, 3)).reshape(t.shape)
         case = flight.case
         control = case.params if "control" in flight.tracker.needs else None
-        bounds = flight.medium.bounds((1, 1, 1))
-        numbers = majorants.build(
-            case.majorant, flight.medium, bounds, case.tightness, control
-        ).numbers
-        self.majorant = numbers.get("sigma_t", numbers.get("residual"))
-        self.control = numbers.get("control", 0.0)
+        self._model, self._cells = case.majorant, np.array((1, 1, 1))
+        if case.majorant is None:
+            return
+        self._cells = np.array(majorants.cells_of(case.majorant))
+        bounds = flight.medium.bounds(tuple(self._cells))
+        self._made = majorants.build(case.majorant, flight.medium, bounds, case.tightness, control)
+        cell = self._cell(points)
+        self.majorant = self._value(0, cell) + np.zeros_like(t)
+        last = 2 if case.majorant.kind == "octree" else 1
+        self.control = self._value(last, cell) if control else 0.0
+
+    def _cell(self, points: Array) -> NDArray[np.intp]:
+        share = points / self.flight.medium.extent * self._cells
+        return np.clip(share.astype(np.intp), 0, self._cells - 1)
+
+    def _value(self, layer: int, cell: NDArray[np.intp]) -> Array | float:
+        """What `majorants.build` laid into an array, or its number where there is none."""
+        data = self._made.data
+        if data is None:
+            return list(self._made.numbers.values())[layer]
+        i, j, k = np.moveaxis(cell + (self._model.kind == "grid"), -1, 0)
+        return data[layer][k, j, i].astype(np.float64)
+
+    def crossed(self, ends: Array | float = 0.0) -> Array:
+        """How many planes between cells, or leaves, a path meets that a rate ends on its way.
+
+        Cells that meet in an edge or corner of which the ray passes are entered at once.
+        """
+        segments = self.flight.segments
+        planes = [
+            np.arange(1, n) / n * e
+            for n, e in zip(self._cells, self.flight.medium.extent, strict=True)
+        ]
+        cuts = [
+            crossings(segments[:, axis], segments[:, 3 + axis], planes[axis], segments[:, 6])
+            for axis in range(3)
+        ]
+        start, length = partition(np.concatenate(cuts, axis=1), segments[:, 6])
+        middle = start + length / 2.0
+        cell = self._cell(segments[:, None, :3] + middle[..., None] * segments[:, None, 3:6])
+        if self._model.kind == "octree":
+            cell &= -self._value(1, cell).astype(np.intp)[..., None]
+        # a piece of no length is of the cell before or after
+        other = (np.diff(cell, axis=1) != 0).any(axis=2) & (start[:, 1:] < segments[:, 6:])
+        place = np.minimum(start[:, 1:] / self.step, POINTS - 1).astype(np.intp)
+        alive = np.take_along_axis(self.alive(ends), place, axis=1)
+        return (other * alive).sum(axis=1)
+
+    def alive(self, ends: Array | float) -> Array:
+        """The share of paths that a rate has not ended, at each point."""
+        ended = (ends + np.zeros_like(self.sigma)) * self.step
+        return np.exp(0.5 * ended - np.cumsum(ended, axis=1))
 
     def integral(self, values: Array) -> Array:
         """Of values at the midpoints."""
@@ -42,8 +89,7 @@ class AlongRays:
 
     def until(self, rate: Array, end_rate: Array) -> Array:
         """The integral of a rate over the paths that an end rate has not ended."""
-        ended = np.cumsum(end_rate * self.step, axis=1) - 0.5 * end_rate * self.step
-        return self.integral(rate * np.exp(-ended))
+        return self.integral(rate * self.alive(end_rate))
 
     @property
     def transmittance(self) -> Array:
