@@ -25,6 +25,8 @@ ROUNDS, SAMPLES = 24, 48
 """Of which the counts vary as they do, and samples of each ray in each."""
 CELLS = {"grid": {"resolution": [11, 7, 13]}}
 """That divide no voxels."""
+LEAVES = {"octree": {"resolution": 8, "slack": 1.5}}
+"""So loose that leaves differ from the finest cells, and from those of no slack."""
 Counts = dict[str, Array]
 """Of each counter what a sample of each ray counts; `spare` is how many planes more it may cross,
 where rounding puts the box's own plane just inside the end of the ray."""
@@ -176,19 +178,20 @@ KNOWN: dict[str, Callable[[AlongRays], Counts]] = {
 }  # fmt: skip
 
 
+IN_LEAVES = ("next_flight_ratio", "ratio", "two_knob", "weighted_decomposition")
+
+
 @checks.each("lookups/as-derived", lambda tracker: tracker.name in KNOWN, ("fast", "moments"))
 def derived(rig: Rig, alpha: float, tracker: Tracker) -> None:
     """A crossing, a step or a violation that is counted twice or never hides what a walk costs and
     where a majorant fails: each counter has an integral."""
     # Lookups, steps, crossings and violations, above and below a bounding majorant.
-    for tightness in (1.25, 0.8):
-        flight = voxels(rig, tracker, VOXELS, tightness=tightness, majorant=_cells(tracker))
+    majorants: tuple[Any, Any] = ("global", "global")
+    if "majorant" in tracker.needs and "octree" in tracker.majorants:
+        majorants = CELLS, LEAVES if tracker.name in IN_LEAVES else CELLS
+    for majorant, tightness in zip(majorants, (1.25, 0.8), strict=True):
+        flight = voxels(rig, tracker, VOXELS, tightness=tightness, majorant=majorant)
         check_counters(flight, KNOWN[tracker.name](AlongRays(flight)), alpha / 2)
-
-
-def _cells(tracker: Tracker) -> Any:
-    local = "majorant" in tracker.needs and "grid" in tracker.majorants
-    return CELLS if local else "global"
 
 
 def check_counters(flight: Flight, expected: Counts, alpha: float) -> None:

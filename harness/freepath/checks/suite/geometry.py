@@ -72,12 +72,19 @@ checks = Checks()
 def special(rig: Rig, alpha: float, tracker: Tracker, kind: str) -> None:
     """A ray along an axis divides by 0; on a face, edge or corner planes tie, and a walk stalls,
     skips a cell, or leaves the box by rounding."""
-    # Ray by ray: one that goes wrong must not hide among others.
+    # Ray by ray: one that goes wrong must not hide among others. Voxels are interpolated or not in
+    # turn.
     lines = LINES[kind]
     repeated = tuple(np.tile(array, (4, 1)) for array in lines)
-    flight = voxels(rig, tracker, VOXELS, lines=repeated)
+    nearest = (len(kind) + len(tracker.name)) % 2 == 0
+    interpolation = "nearest" if nearest else "trilinear"
+    flight = voxels(rig, tracker, VOXELS, lines=repeated, interpolation=interpolation)
     demand((flight.segments[:, 6] > 0.1).all(), "a ray that should have a length has none")
     samples = flight.record(2048)
+    if nearest and kind == "all-but-parallel" and not knows_depth(tracker):
+        # which voxel such a ray is in is left to rounding, but lookups and walks must agree on it
+        check_clean(samples.round, bounded=True)
+        return
     check_samples(flight, samples, alpha / 2)
     if samples.round.variance and tracker.unbiased:
         events = largest_events(samples.score)
