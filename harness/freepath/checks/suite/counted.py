@@ -11,7 +11,7 @@ from scipy import special, stats
 
 from freepath.checks.rig import Flight, Rig
 from freepath.checks.suite.common import VOXELS, Checks, everyone, voxels
-from freepath.checks.suite.expectations import AlongRays, Array
+from freepath.checks.suite.expectations import AlongRays, Array, share
 from freepath.checks.verdict import NotApplicable, demand, require
 from freepath.compose.catalog import Tracker
 
@@ -21,7 +21,7 @@ EXACT = frozenset(("closed_form", "cells"))
 """What gives optical depths without a lookup."""
 
 
-ROUNDS, SAMPLES = 24, 48
+ROUNDS, SAMPLES = 24, 128
 """Of which the counts vary as they do, and samples of each ray in each."""
 CELLS = {"grid": {"resolution": [11, 7, 13]}}
 """That divide no voxels."""
@@ -52,10 +52,6 @@ def counted(rig: Rig, alpha: float, tracker: Tracker) -> None:
     demand(lookups > 0, "not one lookup counted in a medium that varies")
 
 
-def _share(of: Array, whole: Array) -> Array:
-    return np.divide(of, whole, out=np.zeros_like(of), where=whole > 0.0)
-
-
 def _walking(along: AlongRays, ends: Array | float = 0.0, residual: Any = None) -> Counts:
     """Of tentative collisions with a step and a lookup each, on a path that a rate ends."""
     residual = along.sigma if residual is None else residual
@@ -74,16 +70,16 @@ def _analog(along: AlongRays) -> Counts:
 
 def _signed(along: AlongRays) -> Counts:
     both = along.sigma + np.abs(along.majorant - along.sigma)
-    return _walking(along, along.majorant * _share(along.sigma, both))
+    return _walking(along, along.majorant * share(along.sigma, both))
 
 
 def _controlled(along: AlongRays, *, weighted: bool) -> Counts:
     """A flight that a collision with the control ends takes a step and no lookup for it."""
     residual = along.sigma - along.control
-    share = np.clip(_share(residual, along.majorant), 0.0, 1.0)
+    real = np.clip(share(residual, along.majorant), 0.0, 1.0)
     if weighted:
-        share = _share(np.abs(residual), np.abs(residual) + np.abs(along.majorant - residual))
-    ends = along.control + along.majorant * share
+        real = share(np.abs(residual), np.abs(residual) + np.abs(along.majorant - residual))
+    ends = along.control + along.majorant * real
     counts = _walking(along, ends, residual)
     if weighted:
         counts["violations"] = np.zeros(len(residual))
@@ -120,9 +116,9 @@ def _series(along: AlongRays) -> Counts:
     lookups = np.cumprod(goes_on, axis=1).sum(axis=1)
     lookups[depth == 0.0] = 0.0
     # a plane is crossed on the way to a point that lies behind it in the majorant's depth
-    behind = along.crossed(_share(along.majorant, _ahead(along)))
+    behind = along.crossed(share(along.majorant, _ahead(along)))
     crossings = whole["crossings"] + (lookups + 1.0) * behind
-    over = lookups * _share(whole["violations"], depth)
+    over = lookups * share(whole["violations"], depth)
     counts = {"lookups": lookups, "steps": lookups + 1.0, "crossings": crossings}
     return counts | {"violations": over, "spare": whole["spare"]}
 
@@ -178,7 +174,7 @@ KNOWN: dict[str, Callable[[AlongRays], Counts]] = {
 }  # fmt: skip
 
 
-IN_LEAVES = ("next_flight_ratio", "ratio", "two_knob", "weighted_decomposition")
+IN_LEAVES = ("ratio", "weighted_decomposition")
 
 
 @checks.each("lookups/as-derived", lambda tracker: tracker.name in KNOWN, ("fast", "moments"))
@@ -190,7 +186,8 @@ def derived(rig: Rig, alpha: float, tracker: Tracker) -> None:
     if "majorant" in tracker.needs and "octree" in tracker.majorants:
         majorants = CELLS, LEAVES if tracker.name in IN_LEAVES else CELLS
     for majorant, tightness in zip(majorants, (1.25, 0.8), strict=True):
-        flight = voxels(rig, tracker, VOXELS, tightness=tightness, majorant=majorant)
+        axes = {"tightness": tightness, "majorant": majorant, "rays": {"chords": {"count": 64}}}
+        flight = voxels(rig, tracker, VOXELS, **axes)
         check_counters(flight, KNOWN[tracker.name](AlongRays(flight)), alpha / 2)
 
 

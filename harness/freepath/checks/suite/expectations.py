@@ -42,8 +42,8 @@ class AlongRays:
         self.control = self._value(last, cell) if control else 0.0
 
     def _cell(self, points: Array) -> NDArray[np.intp]:
-        share = points / self.flight.medium.extent * self._cells
-        return np.clip(share.astype(np.intp), 0, self._cells - 1)
+        where = points / self.flight.medium.extent * self._cells
+        return np.clip(where.astype(np.intp), 0, self._cells - 1)
 
     def _value(self, layer: int, cell: NDArray[np.intp]) -> Array | float:
         """What `majorants.build` laid into an array, or its number where there is none."""
@@ -97,16 +97,20 @@ class AlongRays:
         return np.exp(-self.integral(self.sigma))
 
 
+def share(of: Array, whole: Array) -> Array:
+    """Their quotient, 0 where there is nothing of either."""
+    return np.divide(of, whole, out=np.zeros_like(of), where=whole > 0.0)
+
+
 def binary(along: AlongRays) -> Expected:
     """Delta tracking, of the residual where there is a control: 0 or 1."""
-    rate = np.full_like(along.sigma, along.majorant)
-    return along.transmittance, along.until(rate, along.sigma)
+    return along.transmittance, along.until(along.majorant, along.sigma)
 
 
 def ratio(along: AlongRays) -> Expected:
     """Ratio tracking."""
-    square = along.integral(along.sigma**2 / along.majorant)
-    return along.transmittance**2 * np.exp(square), along.integral(0 * along.sigma + along.majorant)
+    square = along.integral(share(along.sigma**2, along.majorant))
+    return along.transmittance**2 * np.exp(square), along.integral(along.majorant)
 
 
 def free(acceptance: float, albedo: float = 1.0) -> Callable[[AlongRays], Expected]:
@@ -116,8 +120,7 @@ def free(acceptance: float, albedo: float = 1.0) -> Callable[[AlongRays], Expect
         null = np.abs(along.majorant - along.sigma)
         real = acceptance * albedo * along.sigma
         second = np.exp(along.integral(null * (real + null) / along.majorant - along.majorant))
-        rate = np.full_like(along.sigma, along.majorant)
-        return second, along.until(rate, along.majorant * real / (real + null))
+        return second, along.until(along.majorant, along.majorant * real / (real + null))
 
     return expected
 
@@ -126,7 +129,7 @@ def residual_ratio(along: AlongRays) -> Expected:
     """With a control."""
     residual = along.sigma - along.control
     second = along.transmittance**2 * np.exp(along.integral(residual**2 / along.majorant))
-    return second, along.integral(0 * along.sigma + along.majorant)
+    return second, along.integral(along.majorant)
 
 
 def weighted_decomposition(along: AlongRays) -> Expected:
@@ -135,15 +138,13 @@ def weighted_decomposition(along: AlongRays) -> Expected:
     null = np.abs(along.majorant - residual)
     both = np.abs(residual) + null
     second = np.exp(along.integral(null * both / along.majorant - along.majorant - along.control))
-    rate = np.full_like(along.sigma, along.majorant)
     ends = along.control + along.majorant * np.abs(residual) / both
-    return second, along.until(rate, ends)
+    return second, along.until(along.majorant, ends)
 
 
 def track_length_cost(along: AlongRays) -> Expected:
     """Two lookups a segment but the last; its variance has no formula."""
-    rate = np.full_like(along.sigma, along.majorant)
-    return None, 2.0 * along.until(rate, along.sigma) + along.transmittance
+    return None, 2.0 * along.until(along.majorant, along.sigma) + along.transmittance
 
 
 def cost_of(known: Callable[[AlongRays], Expected]) -> Callable[[AlongRays], Expected]:

@@ -12,7 +12,6 @@ from freepath.checks.identities import check_clean, check_each_ray, largest_even
 from freepath.checks.rig import Rig
 from freepath.checks.suite.common import UPWARD, VOXELS, Checks, everyone, knows_depth, unit, voxels
 from freepath.checks.suite.thickness import WITHIN_1
-from freepath.checks.truth import MajorantAlongRays
 from freepath.checks.verdict import demand
 from freepath.compose.catalog import Tracker
 
@@ -108,15 +107,7 @@ def no_length(rig: Rig, alpha: float, tracker: Tracker) -> None:
 def crossings(rig: Rig, alpha: float, tracker: Tracker) -> None:
     """A walk that stalls crosses a plane twice, one that skips does not: the number of planes is
     known."""
-    # As many as there are planes, but for ties that rounding decides.
-    flight = voxels(rig, tracker, VOXELS, rays={"chords": {"count": 512}}, seed=rig.seed + 5)
-    along = MajorantAlongRays(flight.case.majorant, flight.medium, 1.0, flight.segments)
-    found = flight.run(1).counters["crossings"]
-    expected = along.planes()
-    # rounding may put the box's own plane just inside the end of a ray
-    most = expected + len(flight.segments)
-    text = f"{found} planes crossed, expected {expected} to {most}"
-    demand(expected - 8 <= found <= most + 8, text)
+    # Along diagonals, where planes tie and rounding decides; lookups/as-derived has chords.
     ties = voxels(rig, tracker, VOXELS, lines=LINES["corner"]).run(1).counters["crossings"]
     demand(3 * 8 <= ties <= 4 * 8, f"{ties} crossings of 8 diagonals, expected 24 to 32")
 

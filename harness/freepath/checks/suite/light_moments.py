@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Any
 
 import numpy as np
@@ -31,14 +32,13 @@ SAMPLERS: dict[str, dict[str, Any]] = {
     "combined": {"combined": {"share": 0.3}},
     "joint": {"joint": {"cells": 5}},
 }
-SHADOWS = ("ratio", "delta", "analytic")
 checks = Checks()
 
 
 class Integrals:
     """Second moments and lookups of light that scatters once in a homogeneous cube, of each ray."""
 
-    def __init__(self, flight: Flight, position: list[float], g: float, shadow: str):
+    def __init__(self, flight: Flight, position: list[float], g: float):
         segments = flight.segments
         self.length, self.params = segments[:, 6:], flight.case.params
         self.t = (np.arange(POINTS) + 0.5) / POINTS * self.length
@@ -57,11 +57,7 @@ class Integrals:
         self.angle = np.arctan((self.length - self.nearest) / self.off)
         self.angle += np.arctan(self.nearest / self.off)
         self.light = ALBEDO * INTENSITY * SIGMA * henyey_greenstein(g, self.cosine) / distance**2
-        self.seen, self.shadow = {
-            "analytic": (np.exp(-2.0 * SIGMA * way), 0.0 * way),
-            "delta": (np.exp(-SIGMA * way), MAJORANT / SIGMA * -np.expm1(-SIGMA * way)),
-            "ratio": (_squared(way), MAJORANT * way),
-        }[shadow]
+        self.seen, self.shadow = _squared(way), MAJORANT * way
 
     def along(self, values: Array) -> Array:
         """The integral over each ray."""
@@ -146,7 +142,7 @@ def _squared(way: Array) -> Array:
     return np.exp((SIGMA / MAJORANT - 2.0) * SIGMA * way)
 
 
-def moments(rig: Rig, alpha: float, tracker: str, sampler: Any, place: str, shadow: str) -> None:
+def moments(rig: Rig, alpha: float, tracker: str, sampler: Any, place: str) -> None:
     """Samplers of light stay unbiased with any density that they divide by, and shadow rays with
     any weight: what a slip costs is variance and lookups, which have integrals."""
     # Distances, variance and lookups of single scattering.
@@ -156,11 +152,11 @@ def moments(rig: Rig, alpha: float, tracker: str, sampler: Any, place: str, shad
         medium=homogeneous(SIGMA, albedo=ALBEDO, g=g),
         light={"point": {"position": position, "intensity": INTENSITY}},
         lines=ASLANT,
-        **{"estimand": "radiance", "scatterings": 1, "shadow": shadow, "tightness": TIGHTNESS},
+        **{"estimand": "radiance", "scatterings": 1, "shadow": "ratio", "tightness": TIGHTNESS},
         lanes=16,
     )
     samples, expected = flight.record(16384), flight.reference()
-    integrals = Integrals(flight, position, g, shadow)
+    integrals = Integrals(flight, position, g)
     squared, lookups = integrals.of(tracker)
     check_mean(samples.round.moments, expected, alpha / 4)
     check_count(samples.lookups, lookups, alpha / 4)
@@ -169,12 +165,9 @@ def moments(rig: Rig, alpha: float, tracker: str, sampler: Any, place: str, shad
     require(np.array([stats.kstest(share, "uniform").pvalue]), alpha / 4, "distances (KS)")
 
 
-for place in PLACES:
-    for turn, (name, given) in enumerate(SAMPLERS.items()):
-        # what scores 1 / distance^2 has no fourth moment to speak of where that is small
-        if place == "inside" and name in ("delta", "tabulated"):
-            continue
+for place, (name, given) in itertools.product(PLACES, SAMPLERS.items()):
+    # what scores 1 / distance^2 has no fourth moment to speak of where that is small
+    if place == "outside" or name not in ("delta", "tabulated"):
         (tracker,) = given
-        shadow = SHADOWS[(turn + (place == "inside")) % 3]
-        options = {"sampler": given, "place": place, "shadow": shadow}
+        options = {"sampler": given, "place": place, "kernels": f"scattering/light/{tracker}"}
         checks.one(f"scattering/moments/{place}/{name}", tracker, **options)(moments)

@@ -57,9 +57,9 @@ checks = Checks()
 
 
 def follow(rig: Rig, tracker: Any, medium: Any, **axes: Any) -> Flight:
-    """A flight of paths that collect radiance, in 16 lanes and without a record."""
+    """A flight of paths that collect radiance, in 16 lanes and mostly without a record."""
     given = {"estimand": "radiance", "medium": medium, "tracker": tracker, "lanes": 16} | axes
-    return rig.flight(record=False, **given)
+    return rig.flight(**{"record": False} | given)
 
 
 def homogeneous(sigma_t: float = 2.0, **keys: Any) -> dict[str, Any]:
@@ -166,7 +166,8 @@ def light(
     axes = {"light": lamp, "scatterings": 1, "shadow": "ratio"}
     axes["rays"] = {"orthographic": {"resolution": 9}}
     turned = SHEARED if place == "outside" else None
-    flight = follow(rig, sampler, homogeneous(albedo=0.5, g=g), turned=turned, **axes)
+    # with a record, as the kernel of their moments
+    flight = follow(rig, sampler, homogeneous(albedo=0.5, g=g), turned=turned, record=True, **axes)
     one, expected = flight.run(8192), flight.reference()
     check_clean(one, bounded=True)
     known = np.isfinite(expected)
