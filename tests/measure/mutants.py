@@ -55,8 +55,8 @@ HOST_RULES = {
 }  # fmt: skip
 EQUIVALENT: dict[tuple[str, str], str] = {}
 """(file, the line as it is then): why nothing can see it."""
-SECONDS = 90
-"""After which a check has no end: what passes takes a few, more where much else runs."""
+SECONDS = 60
+"""Of the CPU, after which a check has no end: what passes takes a few."""
 
 
 class Slip(NamedTuple):
@@ -158,7 +158,7 @@ def ended(slip, names, folder):
     try:
         found = _run([__file__, "--child", *names], environment)
         said = found.stdout.splitlines()
-        if found.returncode == -signal.SIGALRM:
+        if found.returncode == -signal.SIGPROF:
             return "no end"
         who = said[-1] if said else "a crash"
         if who == "survives" and slip.file.startswith("harness/"):
@@ -192,7 +192,7 @@ def child(names):
         rig = Rig(one_device([]), known, Path(folder))
         for name in names:
             # ends the process, also where a kernel does not return
-            signal.alarm(SECONDS)
+            signal.setitimer(signal.ITIMER_PROF, SECONDS)
             try:
                 checks[name].run(rig, LEVEL)
             except NotApplicable:
