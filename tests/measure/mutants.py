@@ -59,6 +59,17 @@ SECONDS = 60
 """Of the CPU, after which a check has no end: what passes takes a few."""
 
 
+FIRST = {
+    "score": ("hard/accumulation", "hard/loose/step-cap", "hard/long-runs", "hard/channels"),
+    "light": ("hard/scattering/moments", "hard/scattering/sky", "hard/p_absorb", "hard/scattering"),
+    "lanes": ("hard/random-numbers", "hard/contrast/half-values"),
+    "math": ("hard/random-numbers", "inversion"),
+    "media": ("lookups/as-derived", "hard/geometry", "inversion", "hard/contrast"),
+    "walk": ("lookups/as-derived", "hard/geometry"),
+}
+"""By folder, the checks that know most of it: they are run first."""
+
+
 class Slip(NamedTuple):
     """A line of a file below the package's folders, and what it becomes by a rule."""
 
@@ -142,7 +153,7 @@ def checks_of(slip, texts, order):
         names = [one for one, text in texts.items() if "majorant_data" in text]
     order.shuffle(names)
     tracker = f"/{Path(slip.file).stem}"
-    first = ("lookups/as-derived", "hard/scattering/moments", "identity", "moments")
+    first = FIRST.get(Path(slip.file).parts[1], ("lookups/as-derived", "identity"))
     return sorted(names, key=lambda one: (tracker not in one, not one.startswith(first)))
 
 
