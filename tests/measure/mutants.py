@@ -3,7 +3,7 @@
     python tests/measure/mutants.py [--sample N] [--seed S] [--files PART] [--checks N] [--list]
 
 Signs, axes, strides, clamps, counts, channels, comparisons and constants are changed one at a time,
-in a copy of the package. Those fast checks that compose the file are run on it, or build what it
+in a copy of the package. Those checks that compose the file are run on it, or build what it
 prepares, in a process of their own, until one fails; a slip of the host is shown to its tests too.
 A process without an end counts as caught, a slip that does not compile as none. What survives is
 printed with its line; exit code 8 where one does that is not among EQUIVALENT.
@@ -116,7 +116,7 @@ def _of(path, rules, silent):
 
 
 def covering():
-    """The sources that each fast check begins with: {check's name: text}."""
+    """The sources that each check begins with: {check's name: text}."""
     from freepath.checks import registry
     from freepath.checks.rig import Rig
     from freepath.compose import catalog
@@ -133,7 +133,7 @@ def covering():
     with tempfile.TemporaryDirectory() as folder:
         rig = Looking(one_device([]), known, Path(folder))
         for check in registry.checks(known):
-            if "fast" in check.labels and not check.reason_against(rig.device.info):
+            if check.in_tests and not check.reason_against(rig.device.info):
                 try:
                     check.run(rig, 1e-6)
                 except Seen as seen:
