@@ -10,7 +10,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "harness" / "freepath"
 BUDGET = {
-    "checks": 4600,
+    "checks": 5010,
     "kernels": 3100,
     "scene": 3010,
     "show": 3175,

@@ -7,11 +7,13 @@ import pytest
 
 from freepath.checks import cases
 from freepath.checks.identities import (
+    NO_EVENTS,
+    _p_values,
     check_clean,
     check_empty,
     check_independence,
     check_mean,
-    largest_event,
+    largest_events,
     violations_by_rounding,
 )
 from freepath.checks.verdict import Failure
@@ -113,7 +115,7 @@ def grazing(seed):
     return found, expected
 
 
-def rejected_means(drawn, alpha, event=largest_event, bias=0.0):
+def rejected_means(drawn, alpha, event=largest_events, bias=0.0):
     count = 0
     for found, expected in drawn:
         mean = found.mean(axis=1) + bias
@@ -133,16 +135,43 @@ def drawn_scores(times):
 def test_a_rare_score_that_did_not_come_between_quiet_rays_is_no_bias():
     drawn = [grazing(seed) for seed in range(200)]
     assert rejected_means(drawn, 1e-3) <= 2
-    assert rejected_means(drawn, 1e-3, lambda found: 0.0) > 20  # not knowing how large one is
+    assert rejected_means(drawn, 1e-3, lambda found: NO_EVENTS) > 20  # not knowing how large one is
 
 
 def test_means_are_rejected_at_most_as_often_as_it_says():
     assert 1 <= rejected_means(drawn_scores(200), 0.05) <= 25  # 10 expected; 1 in 10,000 beyond
 
 
-def test_a_bias_of_all_rays_is_found():
-    # of the sum of a group's rays, 12 standard errors and more
-    assert rejected_means(drawn_scores(20), ALPHA, bias=0.02) == 20
+def weighed(times):
+    """Scores with a long tail, as of products of weights: of a mean of 1 and a variance of 6."""
+    for seed in range(times):
+        normal = np.random.default_rng(seed).normal(size=(RAYS, COUNT))
+        yield np.exp(1.4 * normal - 0.98), np.ones(RAYS)
+
+
+@pytest.mark.parametrize("bias", [0.05, -0.05])
+def test_a_bias_of_all_rays_is_found(bias):
+    assert rejected_means(weighed(10), ALPHA, bias=bias) == 10
+
+
+def test_a_bias_of_all_rays_is_found_in_their_sum():
+    for found, expected in weighed(5):
+        mean = found.mean(axis=1) + 0.05
+        moments = Moments(COUNT, mean, ((found - mean[:, None]) ** 2).sum(axis=1))
+        with pytest.raises(Failure, match="in part 0 of 9"):
+            check_mean(moments, expected, ALPHA, largest_events(found))
+
+
+def test_what_did_not_come_explains_a_loss_and_no_gain():
+    found = np.ones((RAYS, COUNT))
+    found[0, 0] = 50.0
+    events = largest_events(found)
+    assert events[0] < 0.1
+    assert events[1] > 48.0
+    error = np.full(2, found[0].var() / COUNT)
+    loss, gain = _p_values(np.array([-0.2, 0.2]), error, events / COUNT)
+    assert gain < 1e-10
+    assert loss > 1e-3
 
 
 @pytest.mark.parametrize("shared", [0.3, 1.0])

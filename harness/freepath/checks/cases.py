@@ -16,7 +16,7 @@ from freepath.checks.identities import (
     check_inversion,
     check_mean,
     check_weighted_free_path,
-    largest_event,
+    largest_events,
     noise_of,
     roundings,
     violations_by_rounding,
@@ -61,7 +61,7 @@ def check_samples(flight: Flight, samples: Samples, alpha: float) -> None:
         pieces = _pieces(flight)
         check_exact(moments, expected, flight.rounding, _largest_depth(flight), pieces)
     else:
-        check_mean(moments, expected, alpha / 3, largest_event(samples.score))
+        check_mean(moments, expected, alpha / 3, largest_events(samples.score))
         if len(expected) > MANY:
             check_independence(samples.score, alpha / 3)
         if case.estimand == "free_path" and ends_where_it_scores(samples):

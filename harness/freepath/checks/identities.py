@@ -20,18 +20,32 @@ Array = NDArray[np.float64]
 RESOLVED = 0.05  # relative standard error of a mean that says something
 EVENTS = 16  # of a ray, at least, that can show whether samples depend on each other
 GROUPS = 8  # of rays with like expectations: errors of thin and of thick rays must not cancel
+NO_EVENTS = np.zeros(2)
+
+
+def _p_values(off: Array, square_error: Array, events: Array) -> Array:
+    """Two-sided z-tests of sums that are `off` by so much, with independent errors.
+
+    Rare events that did not come in a ray are not in its `square_error` either. If they are all
+    that a sum is off by, they are as many as that over what one adds to it, and their variance is
+    the product: the score test of a Poisson rate, where a Wald test has far too many small
+    p-values. What did not come pulls the other way: `events` are (below, above), of which a sum
+    that is too low lacks the latter. So a bias away from a long tail has nothing to hide behind.
+    """
+    event = np.where(off > 0.0, events[0], events[1])
+    off = np.abs(off)
+    return 2.0 * stats.norm.sf(off / np.sqrt(square_error + event * off))
 
 
 def _require_groups(
-    measured: Array, expected: Array, square_error: Array, event: float, test: tuple[float, str]
+    measured: Array, expected: Array, square_error: Array, events: Array, test: tuple[float, str]
 ) -> None:
-    """Two-sided z-tests of sums over groups of rays with independent errors.
+    """Tests of sums over all rays, and over groups of rays, that share a level by Sidak 1967.
 
+    His inequality holds for normal variables however they depend on each other, as the sum of all
+    does on those of groups. All together see a bias that every ray shares, groups one that cancels.
     Each group has the same share of all noise: a group of rays on which hardly anything happens
-    would have no normal distribution, nor a sample of its variance. Rare events that did not come
-    in a ray are not in its `square_error` either. If they are all that a sum is off by, they are
-    as many as that over `event`, what one adds to it, and their variance is the product: the score
-    test of a Poisson rate, where a Wald test has far too many small p-values.
+    would have no normal distribution, nor a sample of its variance.
     """
     alpha, what = test
     order = np.argsort(expected, kind="stable")
@@ -40,16 +54,27 @@ def _require_groups(
         demand((measured == expected).all(), f"{what}: without variance, and not as expected")
         return
     group = np.minimum((GROUPS * share / share[-1]).astype(int), GROUPS - 1)
-    rays = np.bincount(group, minlength=GROUPS)
-    found, wanted, square = (
-        np.bincount(group, values[order], GROUPS) for values in (measured, expected, square_error)
-    )
+
+    def summed(values: Array) -> Array:
+        """Of all rays first, then of each group."""
+        return np.append(values.sum(), np.bincount(group, values[order], GROUPS))
+
+    rays, square = summed(np.ones(len(order))), summed(square_error)
     there = square > 0.0
     # a sum of differences, as that of two sums would lose its digits where all is nearly 1
-    difference = np.bincount(group, (measured - expected)[order], GROUPS)
-    off = np.abs(difference[there])
-    p_values = 2.0 * stats.norm.sf(off / np.sqrt(square[there] + event * off))
-    require(p_values, alpha, what, found[there] / rays[there], wanted[there] / rays[there])
+    p_values = _p_values(summed(measured - expected)[there], square[there], events)
+    found, wanted = (summed(values)[there] / rays[there] for values in (measured, expected))
+    require(p_values, alpha, what, found, wanted)
+
+
+def check_each_ray(moments: Moments, expected: Array, events: Array, alpha: float) -> None:
+    """z-tests of single rays, but for the roundings of a hundred collisions."""
+    off = moments.mean - expected
+    off = np.sign(off) * np.maximum(np.abs(off) - 1e-5 * expected, 0.0)
+    # what is not off is not divided by a variance of 0
+    error = np.maximum(moments.variance / moments.count, np.finfo(float).tiny)
+    p_values = _p_values(off, error, events / moments.count)
+    require(p_values, alpha, "mean of a ray", moments.mean, expected)
 
 
 def check_clean(one: Round, *, bounded: bool, violations: int = 0) -> None:
@@ -78,36 +103,37 @@ def noise_of(moments: Moments, expected: Array) -> float:
     return float(np.sqrt((moments.variance / moments.count).sum()) / expected.sum())
 
 
-def check_mean(moments: Moments, expected: Array, alpha: float, event: float = 0.0) -> None:
-    """z-tests of the mean of each group of rays.
+def check_mean(moments: Moments, expected: Array, alpha: float, events: Array = NO_EVENTS) -> None:
+    """z-tests of the mean of all rays and of each group.
 
     They must be able to show something: weights that explode would hide behind their own variance.
-    `event` is how much a rare one adds to a score, where that is known: see `largest_event`.
+    `events` is how much a rare one adds to a score, where that is known: see `largest_events`.
     """
     square_error = moments.variance / moments.count
     noise = noise_of(moments, expected)
     demand(noise < RESOLVED, f"mean: known to {noise:.2g} only")
-    event /= moments.count
-    _require_groups(moments.mean, expected, square_error, event, (alpha, "mean"))
+    _require_groups(moments.mean, expected, square_error, events / moments.count, (alpha, "mean"))
 
 
-def largest_event(scores: Array) -> float:
-    """How large the deviations (rays, samples) are that make a ray vary; the largest of all rays.
+def largest_events(scores: Array) -> Array:
+    """How large the deviations (rays, samples) below and above the mean are that make a ray vary.
 
-    Each weighs what it adds to the variance. So of a ray on which something happens now and then
-    it is the size of that, however rare.
+    The largest of all rays. Each weighs what it adds to the variance. So of a ray on which
+    something happens now and then it is the size of that, however rare.
     """
-    deviation = np.abs(scores - scores.mean(axis=1, keepdims=True))
+    deviation = scores - scores.mean(axis=1, keepdims=True)
     square = np.einsum("rs,rs->r", deviation, deviation)
-    cube = np.einsum("rs,rs,rs->r", deviation, deviation, deviation)
-    return float((cube / np.where(square > 0.0, square, np.inf)).max())
+    square = np.where(square > 0.0, square, np.inf)
+    sides = np.maximum(-deviation, 0.0), np.maximum(deviation, 0.0)
+    cubes = (np.einsum("rs,rs,rs->r", one, one, one) for one in sides)
+    return np.array([(cube / square).max() for cube in cubes])
 
 
 def check_count(counts: Array, expected: Array, alpha: float) -> None:
     """z-tests of the mean of whole numbers (rays, samples), such as lookups."""
     samples = counts.shape[1]
-    square_error, event = counts.var(axis=1, ddof=1) / samples, largest_event(counts) / samples
-    _require_groups(counts.mean(axis=1), expected, square_error, event, (alpha, "count"))
+    square_error, events = counts.var(axis=1, ddof=1) / samples, largest_events(counts) / samples
+    _require_groups(counts.mean(axis=1), expected, square_error, events, (alpha, "count"))
 
 
 def check_variance(scores: Array, expected: Array, alpha: float) -> None:
@@ -122,8 +148,8 @@ def check_variance(scores: Array, expected: Array, alpha: float) -> None:
     square = squares.sum(axis=1) / (count - 1)
     fourth = (squares**2).mean(axis=1)
     error = np.maximum(fourth - square**2 * (count - 3) / (count - 1), 0.0) / count
-    event = largest_event(squares) / count
-    _require_groups(square, expected, error, event, (alpha, "variance"))
+    events = largest_events(squares) / count
+    _require_groups(square, expected, error, events, (alpha, "variance"))
 
 
 def check_empty(moments: Moments, depth: Array, rounding: float) -> None:

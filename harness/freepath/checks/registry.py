@@ -15,6 +15,7 @@ SUITE = (
     *("smoke", "identity", "moments", "random_numbers", "empty_full", "thickness", "majorants"),
     *("geometry", "long_runs", "scattering", "near_light", "absorption", "channels", "counted"),
     "stored",
+    "light_moments",
 )
 """The modules of `suite`, in the order of their checks."""
 

@@ -180,11 +180,21 @@ class Rig:
         return case
 
     def flight(
-        self, *, lines: Lines | None = None, count: bool = True, record: bool = True, **axes: Any
+        self,
+        *,
+        lines: Lines | None = None,
+        turned: np.ndarray | None = None,
+        count: bool = True,
+        record: bool = True,
+        **axes: Any,
     ) -> Flight:
-        """Build a case. `lines` are origins and directions of its rays, not random chords."""
+        """Build a case. `lines` are origins and directions of its rays, not random chords.
+
+        `turned` (3, 3) are the sides of a unit cube of the medium in the world, as columns: for
+        voxels that are sheared and rotated as those of an OpenVDB file may be.
+        """
         case = self.case(**axes)
-        scene, read = self._scenes(case, lines)
+        scene, read = self._scenes(case, lines, turned)
         medium = scene.medium
         structure = binding.structure_of(
             case, self.catalog, medium, self.device, count=count, record=record
@@ -197,11 +207,15 @@ class Rig:
         tracker = self.catalog.trackers[case.tracker]
         return Flight(case, tracker, read, stored.medium, runner, record)
 
-    def _scenes(self, case: Case, lines: Lines | None) -> tuple[Scene, Scene]:
+    def _scenes(
+        self, case: Case, lines: Lines | None, turned: np.ndarray | None
+    ) -> tuple[Scene, Scene]:
         """The scene of a case, and the same with its rays rounded as the kernel reads them."""
-        kind = str(case.medium.as_dict())
+        kind = f"{case.medium.as_dict()} {turned}"
         if kind not in self._media:
-            self._media[kind] = build_medium(case.medium)
+            self._media[kind] = made = build_medium(case.medium)
+            if turned is not None:
+                made.to_medium = made.to_medium @ np.pad(np.linalg.inv(turned), (0, 1))
         medium = self._media[kind]
         rays = str(case.rays.as_dict())
         # no other rays are drawn: those are the same in every repeat, and so are their references

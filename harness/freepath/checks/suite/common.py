@@ -21,6 +21,9 @@ COUNTS = (12, 4, 8)
 _RANDOM = np.random.default_rng(4)
 VOXELS = 4.0 * _RANDOM.random(COUNTS) * (_RANDOM.random(COUNTS) > 0.5)
 
+SHEARED = np.array([[0.6, -0.7, 0.1], [0.9, 0.5, -0.2], [0.0, 0.3, 1.1]])
+"""Sides of a cube as columns: turned by half a right angle, stretched and sheared."""
+
 Wanted = Callable[[Tracker], bool]
 Labels = tuple[str, ...]
 Declare = Callable[[Any], Any]

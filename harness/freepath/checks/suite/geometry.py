@@ -6,17 +6,14 @@ import itertools
 from typing import Any
 
 import numpy as np
-from scipy import stats
 
 from freepath.checks.cases import check_samples
-from freepath.checks.identities import check_clean
+from freepath.checks.identities import check_clean, check_each_ray, largest_events
 from freepath.checks.rig import Rig
 from freepath.checks.suite.common import UPWARD, VOXELS, Checks, everyone, knows_depth, unit, voxels
 from freepath.checks.suite.thickness import WITHIN_1
-from freepath.checks.truth import MajorantAlongRays
-from freepath.checks.verdict import demand, require
+from freepath.checks.verdict import demand
 from freepath.compose.catalog import Tracker
-from freepath.measure.stats import Moments
 
 Lines = tuple[np.ndarray, np.ndarray]
 UNITS = {"1e-6": 1e-6, "1e6": 1e6}
@@ -74,24 +71,23 @@ checks = Checks()
 def special(rig: Rig, alpha: float, tracker: Tracker, kind: str) -> None:
     """A ray along an axis divides by 0; on a face, edge or corner planes tie, and a walk stalls,
     skips a cell, or leaves the box by rounding."""
-    # Ray by ray: one that goes wrong must not hide among others.
+    # Ray by ray: one that goes wrong must not hide among others. Voxels are interpolated or not in
+    # turn.
     lines = LINES[kind]
     repeated = tuple(np.tile(array, (4, 1)) for array in lines)
-    flight = voxels(rig, tracker, VOXELS, lines=repeated)
+    nearest = (len(kind) + len(tracker.name)) % 2 == 0
+    interpolation = "nearest" if nearest else "trilinear"
+    flight = voxels(rig, tracker, VOXELS, lines=repeated, interpolation=interpolation)
     demand((flight.segments[:, 6] > 0.1).all(), "a ray that should have a length has none")
     samples = flight.record(2048)
+    if nearest and kind == "all-but-parallel" and not knows_depth(tracker):
+        # which voxel such a ray is in is left to rounding, but lookups and walks must agree on it
+        check_clean(samples.round, bounded=True)
+        return
     check_samples(flight, samples, alpha / 2)
     if samples.round.variance and tracker.unbiased:
-        each_ray(samples.round.moments, flight.reference(), alpha / 2)
-
-
-def each_ray(moments: Moments, expected: np.ndarray, alpha: float) -> None:
-    """z-tests of single rays; one of hardly a collision has no normal distribution."""
-    events = 2.0 / moments.count
-    error = np.sqrt(moments.variance / moments.count + events**2)
-    deviation = np.maximum(np.abs(moments.mean - expected) - events, 0.0)
-    p_values = 2.0 * stats.norm.sf(deviation / error)
-    require(p_values, alpha, "mean of a ray", moments.mean, expected)
+        events = largest_events(samples.score)
+        check_each_ray(samples.round.moments, flight.reference(), events, alpha / 2)
 
 
 @checks.hard("geometry/no-length", everyone)
@@ -111,15 +107,7 @@ def no_length(rig: Rig, alpha: float, tracker: Tracker) -> None:
 def crossings(rig: Rig, alpha: float, tracker: Tracker) -> None:
     """A walk that stalls crosses a plane twice, one that skips does not: the number of planes is
     known."""
-    # As many as there are planes, but for ties that rounding decides.
-    flight = voxels(rig, tracker, VOXELS, rays={"chords": {"count": 512}}, seed=rig.seed + 5)
-    along = MajorantAlongRays(flight.case.majorant, flight.medium, 1.0, flight.segments)
-    found = flight.run(1).counters["crossings"]
-    expected = along.planes()
-    # rounding may put the box's own plane just inside the end of a ray
-    most = expected + len(flight.segments)
-    text = f"{found} planes crossed, expected {expected} to {most}"
-    demand(expected - 8 <= found <= most + 8, text)
+    # Along diagonals, where planes tie and rounding decides; lookups/as-derived has chords.
     ties = voxels(rig, tracker, VOXELS, lines=LINES["corner"]).run(1).counters["crossings"]
     demand(3 * 8 <= ties <= 4 * 8, f"{ties} crossings of 8 diagonals, expected 24 to 32")
 

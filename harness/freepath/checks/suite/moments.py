@@ -13,14 +13,15 @@ from freepath.checks.media import MAJORANTS, MEDIA
 from freepath.checks.model import Check
 from freepath.checks.rig import Flight, Rig
 from freepath.checks.suite import expectations as known
-from freepath.checks.truth import MajorantAlongRays
 from freepath.checks.verdict import demand
 from freepath.compose.catalog import Catalog
 
 SAMPLES = 4096
+TIGHTNESS = (1.5, 2.0, 1.25, 4.0)
 THICKEST = 2.0
 """The optical depth beyond which weights have so heavy a tail that the variance of a sample says
 little about the variance."""
+EXACT = {"delta": known.binary, "ratio": known.ratio}
 RELATIVES: dict[str, tuple[dict[str, Any], float, Callable[..., known.Expected]]] = {
     "weighted_delta": ({}, 1.5, known.free(1.0)),
     "weighted_delta-not-bounded": ({}, 0.8, known.free(1.0)),
@@ -43,11 +44,12 @@ RELATIVES: dict[str, tuple[dict[str, Any], float, Callable[..., known.Expected]]
 
 def checks(catalog: Catalog) -> Iterator[Check]:
     """Of delta and ratio tracking in every medium, of their relatives in two."""
-    for tracker, expected in EXACT.items():
+    for tracker, known_of in EXACT.items():
         for m, medium in enumerate(MEDIA):
             for j, majorant in enumerate(MAJORANTS):
                 axes = {"tracker": tracker, "medium": medium, "majorant": majorant}
-                axes |= {"tightness": 1.5, "lanes": (16, 1)[(m + j) % 2]}
+                axes |= {"tightness": TIGHTNESS[(m + 2 * j) % 4], "lanes": (16, 1)[(m + j) % 2]}
+                expected = partial(_relative, known_of)
                 yield _check(f"{tracker}/{medium}/{majorant}", tracker, axes, expected)
     for name, (parameters, tightness, known_of) in RELATIVES.items():
         tracker = name.partition("-")[0]
@@ -87,23 +89,3 @@ def as_derived(
     total = samples.lookups.sum()
     counted = samples.round.counters["lookups"]
     demand(total == counted, f"{counted} lookups in all, {total:.0f} in single samples")
-
-
-def _along(flight: Flight) -> MajorantAlongRays:
-    case = flight.case
-    return MajorantAlongRays(case.majorant, flight.medium, case.tightness, flight.segments)
-
-
-def _delta(flight: Flight) -> known.Expected:
-    transmittance = flight.reference()
-    variance = transmittance * (1.0 - transmittance)
-    return variance, _along(flight).collisions_until_real()
-
-
-def _ratio(flight: Flight) -> known.Expected:
-    depth, majorant = flight.depth, _along(flight)
-    variance = np.exp(-2.0 * depth) * np.expm1(majorant.square_over_majorant())
-    return variance, majorant.tentative_collisions()
-
-
-EXACT: dict[str, Callable[[Flight], known.Expected]] = {"delta": _delta, "ratio": _ratio}

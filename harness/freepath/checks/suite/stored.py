@@ -29,17 +29,53 @@ def in_voxels(tracker: Tracker) -> bool:
 
 
 def every_value(rig: Rig, alpha: float, lanes: int) -> None:
-    """A conversion of one's own loses the denormal halves, or the largest: all that are finite must
-    be read as the same float."""
-    bits = np.arange(INFINITE, dtype=np.uint16)
+    """A helper that mixes up two of its lanes, or a conversion of one's own that loses the denormal
+    halves, is seen in some shapes of a device alone: each shape reads, compares, picks and stores
+    as one lane does, and all finite halves are the same float."""
+    halves = np.arange(INFINITE, dtype=np.uint16)
+    count = len(halves)
+    place = np.random.default_rng(lanes).permutation(count).astype(np.uint32)
+    single = halves.view(np.float16).astype(np.float32)
     part = Lanes(rig, lanes, more=kernel_files.read("media/storage_half").code)
-    body = "out0 = gather_half((__global const half *)in0_, as_index(in1));"
-    inputs = [bits.view(np.uint32), np.arange(len(bits), dtype=np.uint32)]
-    (found,) = part(body, inputs, ["real"], len(bits))
-    expected = bits.view(np.float16).astype(np.float32)
-    wrong = np.flatnonzero(found[:, 0] != expected)
-    first = [(hex(i), found[i, 0], expected[i]) for i in wrong[:1]]
-    demand(not wrong.size, f"{wrong.size} of {len(bits)} halves are read wrong, first {first}")
+    inputs = [halves.view(np.uint32), place, single.view(np.uint32)]
+    found = np.array(part(BODY, inputs, ["real"] * 6 + ["bits"] * 3, count), float)[..., 0]
+    other, third = single[place], place % 3 == 0
+    alike = np.zeros(-(-count // lanes) * lanes, bool)
+    alike[:count] = third
+    groups = np.repeat(alike.reshape(-1, lanes).sum(axis=1), lanes)[:count]
+    expected = {
+        "gather_half": other,
+        "gather": other,
+        "choose": np.where(third, other, single),
+        "smaller": np.minimum(other, single),
+        "larger": np.maximum(other, single),
+        "store_lanes and load_lanes": single,
+        "lane_count and any_lane": 2 * groups + (groups > 0),
+        "carry": place >= 2**14,
+        "high_word": place.astype(np.uint64) * 0xD2511F53 >> 32,
+    }
+    for one, (name, right) in zip(found, expected.items(), strict=True):
+        wrong = np.flatnonzero(one != right)
+        first = [(hex(i), one[i], right[i]) for i in wrong[:1]]
+        demand(not wrong.size, f"{name}: {wrong.size} of {count} are wrong, first {first}")
+
+
+BODY = """
+out0 = gather_half((__global const half *)in0_, as_index(in1));
+out1 = gather((__global const float *)in2_, as_index(in1));
+const mask third = equal(as_index(in1) % 3, (index)0);
+const real mine = as_real(in2);
+out2 = choose(third, out1, mine);
+out3 = smaller(out1, mine);
+out4 = larger(out1, mine);
+float kept[LANES];
+store_lanes(mine, kept);
+out5 = load_lanes(kept);
+out6 = (bits)(uint)(2 * lane_count(third) + any_lane(third));
+const bits sum = (in1 << 17) + (bits)0x80000000u;
+out7 = carry(sum, (bits)0x80000000u);
+out8 = high_word(in1, 0xD2511F53u);
+"""
 
 
 @checks.hard("contrast/half-denormal", in_voxels)
@@ -76,5 +112,5 @@ HALVES = """Neighbours of 0, of the largest and of the smallest half are halves 
 through one must not see the other, and none is infinite."""
 ENDS = {"ends": (LARGEST, SMALLEST), "storage": "half"}
 checks.hard("contrast/half-million", in_voxels, sentence=HALVES, **ENDS)(contrast)
-for lanes in (1, 16):
+for lanes in (1, 2, 4, 8, 16):
     checks.one(f"contrast/half-values/{lanes}-lanes", lanes=lanes)(every_value)
