@@ -95,18 +95,20 @@ def one_reader(request, monkeypatch, tmp_path):
 @pytest.mark.usefixtures("one_reader")
 class TestBothReaders:
     def test_densities_and_transform(self, grids):
-        densities, to_world, first, _ = openvdb.read_openvdb(grids / "many.vdb", None)
+        volume = openvdb.read_openvdb(grids / "many.vdb", None)
         expected = np.arange(5 * 7 * 9).reshape(5, 7, 9).transpose(2, 1, 0)
-        assert densities.tolist() == expected.tolist()
+        assert volume.densities.tolist() == expected.tolist()
+        assert sorted(volume.others) == ["empty", "tiles", "velocity (of vec3s)"]
         # the centre of the first voxel is index (-3, 2, 10); i goes along y, j against x
-        assert first == (10, 2, -3)
+        assert volume.first == (10, 2, -3)
+        to_world = volume.to_world
         center = to_world @ [0.5, 0.5, 0.5, 1.0]
         assert center.tolist() == [1 - 2 * 0.5, 2 - 3 * 0.25, 3 + 10 * 2]
         assert to_world[:, :3].tolist() == [[0, -0.5, 0], [0.25, 0, 0], [0, 0, 2]]
 
     def test_a_grid_by_name_with_constant_tiles(self, grids):
         for file, name in [("many.vdb", "tiles"), ("one.vdb", None)]:
-            densities, *_ = openvdb.read_openvdb(grids / file, name)
+            densities = openvdb.read_openvdb(grids / file, name).densities
             expected = np.zeros((16, 16, 19))
             expected[:, :, :16] = 2.5
             expected[:2, :2, 17:] = 1.0
@@ -172,9 +174,8 @@ class TestBothReaders:
             openvdb.read_openvdb(grids / "many.vdb", "density")
 
     def test_the_real_cloud_is_its_npy_voxel_for_voxel(self, real_volumes):
-        densities, to_world, *_ = openvdb.read_openvdb(
-            real_volumes / "wdas_cloud_sixteenth.vdb", None
-        )
+        volume = openvdb.read_openvdb(real_volumes / "wdas_cloud_sixteenth.vdb", None)
+        densities, to_world = volume.densities, volume.to_world
         expected = np.load(real_volumes / "cloud_wdas16.npy")
         assert densities.dtype == expected.dtype
         assert np.array_equal(densities, expected)
@@ -383,8 +384,9 @@ class TestOddFiles:
         ],
     )
     def test_what_can_be_read_is(self, odd, file, grid, value):
-        densities, _, _, told = openvdb.read_openvdb(odd / file, grid)
-        assert densities.tolist() == np.full((2, 3, 4), value).tolist()
+        volume = openvdb.read_openvdb(odd / file, grid)
+        assert volume.densities.tolist() == np.full((2, 3, 4), value).tolist()
+        told = volume.told
         assert "of float, active box [0, 0, 0] to [3, 2, 1] [x, y, z], background " in told
         assert ("got version 225" in told) == (file == "newer.vdb")
 

@@ -24,6 +24,7 @@ from freepath.measure.jobs import scenes_of
 from freepath.measure.ladder import Ladder
 from freepath.measure.sweep import Clock, Listener, Sweep
 from freepath.results.folder import RUN, SUMMARY, ResultFolder, Row, read_result
+from freepath.scene import survey
 from freepath.scene.volumes.reading import read_volume
 from freepath.show import answers
 from freepath.show.table import failures, number, uncertainty
@@ -297,13 +298,7 @@ class Search:
         """How dense the volume is along the rays of a sweep."""
         case = sweep.cases[0]
         scene = scenes_of([case], sweep.config.search_path)[case]
-        depths = scene.medium.optical_depth(scene.segments)
-        a_voxel = float(scene.bounds((1, 1, 1))[1].max()) * self.side
-        return (
-            f"optical depth along {len(depths)} rays: mean {depths.mean():.3g}, largest "
-            f"{depths.max():.3g}; of a voxel where it is densest {a_voxel:.3g} "
-            f"(a mean free path is {1 / a_voxel:.3g} voxels there)"
-        )
+        return str(survey.density(scene.medium, scene.segments, self.side))
 
     def keep(self) -> None:
         """Write the last rows of every case into the folder itself, for `freepath report`."""
