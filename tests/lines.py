@@ -12,15 +12,15 @@ PACKAGE = ROOT / "harness" / "freepath"
 BUDGET = {
     "checks": 4600,
     "kernels": 3100,
-    "scene": 3000,
+    "scene": 3230,
     "show": 3150,
     "measure": 2620,
     "config": 2100,
-    "commands": 1700,
+    "commands": 1795,
     "device": 1400,
     "compose": 1000,
     "results": 680,
-    "extras": 838,
+    "extras": 1025,
     "modules on the first floor": 450,
     "cases": 300,
 }

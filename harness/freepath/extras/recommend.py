@@ -215,7 +215,7 @@ class Search:
     def voxels(self) -> tuple[tuple[int, ...], float]:
         """Counts along x, y, z, and the shortest side in the world."""
         keys = self.medium["volume"]
-        volume = read_volume(Path(keys["file"]), keys.get("grid"))
+        volume = read_volume(Path(keys["file"]), keys.get("grid"), keys.get("raw"))
         sides = np.linalg.norm(volume.to_world[:, :3], axis=0)
         return tuple(reversed(volume.densities.shape)), float(sides.min())
 
@@ -340,12 +340,12 @@ class Search:
         lines = [
             "name: recommend",
             f"seed: {SEED}",
-            f"rays: {_json(RAYS)}",
+            f"rays: {as_yaml(RAYS)}",
             "matrix:",
-            *(f"  {axis}: {_json(value)}" for axis, value in matrix.items()),
+            *(f"  {axis}: {as_yaml(value)}" for axis, value in matrix.items()),
             *(["include:"] if others else []),
-            *(f"  - {_json(point)}" for point in others),
-            f"stop: {_json(stop)}",
+            *(f"  - {as_yaml(point)}" for point in others),
+            f"stop: {as_yaml(stop)}",
         ]
         return "\n".join(lines) + "\n"
 
@@ -358,8 +358,8 @@ class Search:
         return path
 
 
-def _json(value: Any) -> str:
-    """As YAML has it too: its escapes know no halves of a letter."""
+def as_yaml(value: Any) -> str:
+    """JSON that is YAML too, whose escapes know no halves of a letter."""
     return json.dumps(value, ensure_ascii=False)
 
 

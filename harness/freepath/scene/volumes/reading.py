@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 from freepath.errors import VolumeError
 from freepath.scene.volumes.npy import MOST_VOXELS, open_npy
 
+WITH_GRIDS = (".vdb", ".nvdb")
+ARRAYS = (".vol", ".pbrt")
+
 
 @dataclass(frozen=True)
 class Volume:
@@ -47,17 +50,24 @@ class Volume:
         return f"{self.path}: {text}{self.remark and f'; {self.remark}'}"
 
 
-def read_volume(path: Path, grid: str | None = None) -> Volume:
-    """Read a .npy, a multi-part EXR, a multi-page TIFF or a grid of an OpenVDB file.
+def read_volume(path: Path, grid: str | None = None, raw: str | None = None) -> Volume:
+    """Read a file in a format that docs/files.md lists, by its suffix.
 
     `grid` names the grid of an OpenVDB file ('' one without a name, `density[1]` the second of that
-    name); without it, the one called `density` or the only grid of scalars. Raises VolumeError,
-    with the file in its message.
+    name); without it, the one called `density` or the only grid of scalars. `raw` says what raw
+    numbers are, see `read_raw`. Raises VolumeError, with the file in its message.
     """
     suffix = path.suffix.lower()
-    if grid is not None and suffix != ".vdb":
-        raise VolumeError(f"{path}: grid {grid!r}: only OpenVDB files have named grids")
-    if suffix == ".npy":
+    if grid is not None and suffix not in WITH_GRIDS:
+        raise VolumeError(f"{path}: grid {grid!r}: only OpenVDB and NanoVDB files have named grids")
+    if raw is not None or suffix in ARRAYS:
+        from freepath.scene.volumes import arrays
+
+        if raw is not None:
+            volume = arrays.read_raw(path, raw)
+        else:
+            volume = arrays.read_vol(path) if suffix == ".vol" else arrays.read_pbrt(path)
+    elif suffix == ".npy":
         volume = Volume(path, open_npy(path), np.eye(3, 4))
         if volume.densities.ndim != 3:
             found = f"{volume.densities.ndim}, its shape is {volume.densities.shape}"
