@@ -11,6 +11,7 @@ from freepath.errors import VolumeError
 MAGIC = 0x56444220
 OLDEST_KNOWN = 222  # the file format of OpenVDB 2.1 (2013) and later
 SCALARS = ("float", "double", "half", "int32", "int64")
+SCALARS += ("int16", "uint32", "Fp4", "Fp8", "Fp16", "FpN")  # of NanoVDB alone
 COUNT_MARK = "\x1e"  # between a name and the count of those that are the same
 
 

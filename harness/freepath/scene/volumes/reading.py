@@ -53,9 +53,9 @@ class Volume:
 def read_volume(path: Path, grid: str | None = None, raw: str | None = None) -> Volume:
     """Read a file in a format that docs/files.md lists, by its suffix.
 
-    `grid` names the grid of an OpenVDB file ('' one without a name, `density[1]` the second of that
-    name); without it, the one called `density` or the only grid of scalars. `raw` says what raw
-    numbers are, see `read_raw`. Raises VolumeError, with the file in its message.
+    `grid` names a grid of OpenVDB or NanoVDB ('' one without a name, `density[1]` the second of
+    that name); without it, the one called `density` or the only grid of scalars. `raw` says what
+    raw numbers are, see `read_raw`. Raises VolumeError, with the file in its message.
     """
     suffix = path.suffix.lower()
     if grid is not None and suffix not in WITH_GRIDS:
@@ -76,6 +76,10 @@ def read_volume(path: Path, grid: str | None = None, raw: str | None = None) -> 
         from freepath.scene.volumes.openvdb import read_openvdb
 
         volume = read_openvdb(path, grid)
+    elif suffix == ".nvdb":
+        from freepath.scene.volumes.nanovdb import read_nanovdb
+
+        volume = read_nanovdb(path, grid)
     else:
         from freepath.scene.volumes.images import read_slices
 
