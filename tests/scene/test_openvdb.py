@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from freepath.errors import VolumeError
-from freepath.scene import build_medium
+from freepath.scene import build_medium, segments
 from freepath.scene.volumes import openvdb, openvdb_header, openvdb_reader
+from freepath.scene.volumes.reading import read_volume
 from scene.helpers import volume_model
 
 MAKE_GRIDS = """
@@ -353,6 +354,19 @@ vdb.write(sys.argv[1] + "/one.vdb", grids=grids[:1])
 vdb.write(sys.argv[1] + "/level.vdb", grids=[vdb.createLevelSetSphere(5.0)])
 grids[0].fill((1200, 1200, 1200), (1200, 1200, 1200), 1.0)
 vdb.write(sys.argv[1] + "/empty.vdb", grids=grids[:1])
+endless = vdb.FloatGrid(background=0.25)
+endless.name = "density"
+endless.fill((2, 3, 4), (3, 3, 4), 1.5)
+endless["a note"] = "of any length"
+rows = [[1, 0.5, 0, 0], [0, 2, 0, 0], [0, 0, 3, 0], [1, 2, 3, 1]]
+turned = [[0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
+moved, scaled = vdb.createLinearTransform(0.5), vdb.createLinearTransform()
+moved.translate((1, 2, 3))
+scaled.scale((1, 2, 3))
+for number, one in enumerate([moved, scaled, rows, turned, 2.0]):
+    chosen = one if isinstance(one, vdb.Transform) else vdb.createLinearTransform(one)
+    endless.transform = chosen
+    vdb.write(sys.argv[1] + f"/endless{number}.vdb", grids=[endless])
 """
 
 
@@ -395,6 +409,10 @@ class TestOddFiles:
         with pytest.raises(VolumeError, match=wanted):
             openvdb.read_openvdb(odd / "whole.vdb", None)
 
+    def test_a_background_that_would_never_end_is_refused(self, odd):
+        with pytest.raises(VolumeError, match="its background is 0.25: outside of its active box"):
+            read_volume(odd / "endless0.vdb")
+
     def test_a_box_that_is_not_in_the_file(self, odd):
         with pytest.raises(VolumeError, match="box has 1732323601 voxels, 6.45 GiB, hardly any in"):
             openvdb.read_openvdb(odd / "empty.vdb", None)
@@ -417,3 +435,21 @@ def test_the_reader_needs_nothing_of_freepath():
         for line in Path(openvdb_reader.__file__).read_text().splitlines()
         if line.startswith(("import ", "from "))
     }
+
+
+def test_a_background_is_found_behind_every_transform(odd, monkeypatch):
+    for number in range(5):
+        path = odd / f"endless{number}.vdb"
+        (entry,) = openvdb_header.contents(path)
+        assert openvdb_header.background(path, entry) == 0.25
+    monkeypatch.setattr(openvdb_header, "MAP_BYTES", {})
+    assert openvdb_header.background(path, entry) is None
+
+
+def test_rays_that_leave_the_active_box_leave_the_medium(odd):
+    medium = build_medium(volume_model(odd / "one.vdb", sigma_t=2.0))
+    origins = np.array([[1.0, 1, 0], [1, 1, -9], [1, 1, 2], [9, 1, 0]])
+    directions = np.tile([0.0, 0.0, 1.0], (4, 1))
+    found = medium.optical_depth(segments(origins, directions, medium))
+    # the box is 2 long and centred at 0.5; from its middle, from outside, behind it, beside it
+    assert found.tolist() == [2 * 1.5 * length for length in (1.5, 2, 0, 0)]

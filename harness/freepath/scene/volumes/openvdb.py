@@ -21,7 +21,7 @@ from freepath.errors import VolumeError
 from freepath.scene.volumes import openvdb_reader
 from freepath.scene.volumes.images import MOST_COMPRESSED, SMALL
 from freepath.scene.volumes.npy import MOST_VOXELS
-from freepath.scene.volumes.openvdb_header import Entry, choose, contents
+from freepath.scene.volumes.openvdb_header import Entry, background, choose, contents
 from freepath.scene.volumes.reading import Volume
 
 SYSTEM_PYTHON = "/usr/bin/python3"
@@ -67,7 +67,7 @@ def read_openvdb(path: Path, grid: str | None) -> Volume:
         to_world,
         tuple(int(i) for i in reversed(answer["minimum"])),
         f"grid {entry} of {entry.kind}",
-        answer["background"],
+        background(path, entry) if answer["background"] is None else answer["background"],
         tuple(str(one) for one in grids or () if one != entry),
         f"OpenVDB says: {words}" if words else "",
     )
