@@ -12,7 +12,7 @@ PACKAGE = ROOT / "harness" / "freepath"
 BUDGET = {
     "checks": 4600,
     "kernels": 3100,
-    "scene": 3510,
+    "scene": 3515,
     "show": 3150,
     "measure": 2620,
     "config": 2100,

@@ -1,6 +1,7 @@
 """NanoVDB: files by a writer of the tests, whose format NanoVDB's own reader was held against."""
 
 import struct
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -135,3 +136,24 @@ def test_what_zip_claims_is_not_believed(tmp_path):
         (tmp_path / "v.nvdb").write_bytes(content)
         with pytest.raises(VolumeError, match=told):
             read_volume(tmp_path / "v.nvdb")
+
+
+def test_a_zip_stream_is_read_to_its_checksum(tmp_path):
+    content = segment([grid(SMALL)], codec=1)
+    for wrong in (content[:-1] + bytes([content[-1] ^ 1]), content.replace(b"x\x9c", b"x\x9d", 1)):
+        (tmp_path / "v.nvdb").write_bytes(wrong)
+        with pytest.raises(VolumeError, match="is damaged, .*: Error -3 while decompressing"):
+            read_volume(tmp_path / "v.nvdb")
+
+
+def test_what_a_name_claims_is_not_allocated(tmp_path):
+    content = bytearray(segment([grid(SMALL)]))
+    content[16 + 136 : 16 + 140] = struct.pack("<I", 2**32 - 1)
+    (tmp_path / "v.nvdb").write_bytes(content)
+    tracemalloc.start()
+    try:
+        with pytest.raises(VolumeError, match="it ends in the name of a grid"):
+            read_volume(tmp_path / "v.nvdb")
+        assert tracemalloc.get_traced_memory()[1] < 1 << 27
+    finally:
+        tracemalloc.stop()

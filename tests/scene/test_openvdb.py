@@ -1,6 +1,7 @@
 import struct
 import subprocess
 import sys
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -453,3 +454,16 @@ def test_rays_that_leave_the_active_box_leave_the_medium(odd):
     found = medium.optical_depth(segments(origins, directions, medium))
     # the box is 2 long and centred at 0.5; from its middle, from outside, behind it, beside it
     assert found.tolist() == [2 * 1.5 * length for length in (1.5, 2, 0, 0)]
+
+
+def test_what_a_name_claims_is_not_allocated(tmp_path):
+    content = table((b"density", FLOAT, 0, 0))
+    place = content.index(b"density") - 4
+    (tmp_path / "v.vdb").write_bytes(content[:place] + b"\xff" * 4 + content[place + 4 :])
+    tracemalloc.start()
+    try:
+        with pytest.raises(VolumeError, match="is truncated"):
+            openvdb_header.contents(tmp_path / "v.vdb")
+        assert tracemalloc.get_traced_memory()[1] < 1 << 27
+    finally:
+        tracemalloc.stop()

@@ -93,9 +93,9 @@ def _listed(file: BinaryIO, size: int) -> list[_Grid]:
         metas = []
         for _ in range(count):
             meta = META.unpack(file.read(META.size))
-            name = file.read(meta[21])
-            if len(name) < meta[21]:
+            if meta[21] > size - file.tell():
                 raise _Damaged("it ends in the name of a grid")
+            name = file.read(meta[21])
             metas.append((name.rstrip(b"\0").decode("utf-8", "replace"), meta))
         start = file.tell()
         for name, meta in metas:
@@ -129,7 +129,11 @@ def _block(path: Path, file: BinaryIO, grid: _Grid) -> bytes:
     if grid.codec == 0:
         block = packed[: grid.size]
     elif grid.codec == 1:
-        block = zlib.decompressobj().decompress(packed[8:], max(1, grid.size))
+        unzip = zlib.decompressobj()
+        block = unzip.decompress(packed[8:], max(1, grid.size))
+        block += unzip.decompress(unzip.unconsumed_tail, 1)  # to the end, where the checksum is
+        if not unzip.eof:
+            raise _Damaged("its zip stream does not end where it should")
     elif grid.codec == 2:
         blosc, parts = imported("imagecodecs", str(path)).blosc_decode, []
         while packed:

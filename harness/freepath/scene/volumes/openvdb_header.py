@@ -17,6 +17,8 @@ MAP_BYTES = dict.fromkeys(("ScaleMap", "UniformScaleMap"), 120)
 MAP_BYTES |= dict.fromkeys(("ScaleTranslateMap", "UniformScaleTranslateMap"), 144)
 MAP_BYTES |= {"TranslationMap": 24, "AffineMap": 128, "UnitaryMap": 128}
 """How many bytes a transform has in a file."""
+LONGEST = 1 << 26
+"""Bytes of a text, or of what else a file says of a grid."""
 COUNT_MARK = "\x1e"  # between a name and the count of those that are the same
 
 
@@ -135,7 +137,7 @@ def _read(file: BinaryIO, form: str) -> tuple[Any, ...]:
 
 def _string(file: BinaryIO) -> str:
     (length,) = _read(file, "I")
-    text = file.read(length)
+    text = file.read(min(length, LONGEST))
     if len(text) < length:
         raise struct.error
     return text.decode("utf-8", "replace")
