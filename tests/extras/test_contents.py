@@ -7,8 +7,9 @@ import pytest
 
 from freepath import cli, config
 from freepath.compose import catalog
+from freepath.config.models import Grid
 from freepath.extras import contents
-from freepath.scene import build_medium, segments, survey
+from freepath.scene import build_medium, majorants, segments, survey
 from freepath.scene.media.grid import GridMedium
 from freepath.scene.volumes.reading import Volume
 from scene.helpers import voxels
@@ -85,6 +86,10 @@ def test_facts_are_of_the_file():
     assert found["optical_depth_of_a_voxel"] == 800
     least = min(found["majorants"], key=lambda one: one["lookups"] + one["crossings"])
     assert least["cells"] == found["majorant"] != (1, 1, 1)
+    model = Grid(resolution=found["majorant"])
+    medium = GridMedium(densities.astype(np.float32), np.eye(3, 4), "trilinear")
+    built = majorants.build(model, medium, medium.bounds(found["majorant"]), 1.0)
+    assert found["bytes_majorant"] == built.data.nbytes
     text = "\n".join(contents.text(found))
     assert "24 x 8 x 16 voxels along x, y, z of uint16, each 1 x 1 x 1" in text
     assert "turned or sheared" not in text

@@ -53,7 +53,6 @@ class Contents:
         grids = self._majorants()
         density = survey.density(medium, self._segments, float(self.sides.min()))
         best = min(grids, key=lambda one: one.steps)
-        cells = np.prod(best.cells)
         return {
             "what": volume.told,
             "grid": volume.grid,
@@ -79,7 +78,8 @@ class Contents:
             "optical_depths": str(density),
             "bytes_float": medium.voxels.nbytes,
             "bytes_half": medium.voxels.nbytes // 2,
-            "bytes_majorant": int(4 * cells),
+            # a grid of majorants has a border of a cell
+            "bytes_majorant": 4 * math.prod(n + 2 for n in best.cells if max(best.cells) > 1),
             "bytes_here": volume.densities.nbytes + 3 * medium.voxels.nbytes + WORKING,
             "majorants": [vars(one) | {"steps": one.steps} for one in grids],
             "majorant": best.cells,
