@@ -12,17 +12,17 @@ PACKAGE = ROOT / "harness" / "freepath"
 BUDGET = {
     "checks": 5010,
     "kernels": 3100,
-    "scene": 3010,
-    "show": 3175,
-    "measure": 3220,
+    "scene": 3540,
+    "show": 3150,
+    "measure": 2621,
     "config": 2100,
-    "commands": 1860,
-    "device": 1410,
+    "commands": 1795,
+    "device": 1402,
     "compose": 1000,
-    "results": 835,
-    "extras": 840,
-    "modules on the first floor": 455,
-    "cases": 320,
+    "results": 680,
+    "extras": 1025,
+    "modules on the first floor": 450,
+    "cases": 300,
 }
 
 

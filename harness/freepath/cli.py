@@ -26,6 +26,7 @@ from freepath.commands import (
     schema,
     source,
     trying,
+    volume,
     worker,
 )
 from freepath.commands.common import let_go_of_output
@@ -33,6 +34,7 @@ from freepath.errors import FAILED, INTERRUPTED, FreepathError, printable
 
 COMMANDS = {
     "run": run,
+    "volume": volume,
     "check": check,
     "recommend": recommend,
     "try": trying,
@@ -63,6 +65,7 @@ examples:
   freepath report out                       one HTML file of it, to look at
   freepath compare before after             what became slower, noisier or different
   freepath check -L fast -j 2               does this device compute what it should?
+  freepath volume cloud.vdb --sigma-t 0.05  what is in a volume of one's own
   freepath recommend cloud.vdb --accuracy 1%   what to use in a volume of one's own
   freepath try my_tracker.cl                is a new tracker right, and where does it pay?
   freepath source quick --case 3            the OpenCL C that case 3 runs

@@ -218,6 +218,8 @@ def test_another_volume_of_the_same_name_runs_again(go, work):
     given = ("-a", "medium={volume: {file: v.npy}}", "-a", "tracker=regular")
     go(*given)
     before = run_ids()
+    used = "v.npy: 4 x 4 x 4 voxels [z, y, x] of float32"
+    assert [row["inputs"] for row in rows().values()] == [used]
     assert go(*given, "--resume")[0] == 0
     assert run_ids() == before
     np.save(work / "v.npy", np.full((4, 4, 4), 2, np.float32))

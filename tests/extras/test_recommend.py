@@ -84,7 +84,7 @@ def test_named_with_a_config_that_measures_it_again(call, cloud, monkeypatch):
         (["flat.npy"], 2, "flat.npy: expected an array of rank 3"),
         (["text.vdb"], 2, "text.vdb: is not an OpenVDB file"),
         (["text.exr"], 2, "text.exr: is not an image"),
-        (["cloud.npy", "--grid", "density"], 2, "only OpenVDB files have named grids"),
+        (["cloud.npy", "--grid", "density"], 2, "only OpenVDB and NanoVDB files have named grids"),
     ],
 )
 def test_what_cannot_be_asked(call, cloud, arguments, code, told):
@@ -195,7 +195,7 @@ def test_a_volume_is_found_where_run_finds_it(work, monkeypatch):
     (work / "far").mkdir()
     np.save(work / "far" / "away.npy", np.ones((4, 4, 4), np.float32))
     monkeypatch.setenv("FREEPATH_VOLUMES", str(work / "far"))
-    assert volume_of(Path("away.npy"), 1.0)["file"] == str(work / "far" / "away.npy")
+    assert volume_of(Path("away.npy"), 1.0)[1]["file"] == str(work / "far" / "away.npy")
 
 
 def test_only_a_folder_of_its_own_is_emptied(work):

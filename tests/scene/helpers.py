@@ -1,10 +1,9 @@
 """Segments, media and quadrature that several tests need."""
 
-from types import SimpleNamespace
-
 import numpy as np
 from scipy.integrate import quad
 
+from freepath.config.models import Volume
 from freepath.scene.media.formulas import Cosine, Exponential, Homogeneous, Layered, Linear
 from freepath.scene.media.gaussian import Gaussian
 from freepath.scene.media.grid import GridMedium
@@ -108,5 +107,4 @@ def write_slices(path, slices, attributes=()):
 
 def volume_model(file, **changes):
     """Return what the config's model of a volume offers."""
-    defaults = {"sigma_t": 1.0, "grid": None, "interpolation": "trilinear", "voxel_size": None}
-    return SimpleNamespace(kind="volume", file=str(file), channels=None, **(defaults | changes))
+    return Volume(**({"file": str(file), "interpolation": "trilinear"} | changes))

@@ -6,6 +6,7 @@ import pytest
 from freepath.errors import VolumeError
 from freepath.scene import build_medium
 from freepath.scene.media.cloud import cloud
+from freepath.scene.volumes.reading import Volume
 from scene.helpers import volume_model
 
 SIZE = (1.0, 2.0, 4.0)
@@ -103,7 +104,7 @@ def test_a_transform_that_flattens_is_refused(tmp_path, monkeypatch):
     flat = np.diag([1.0, 0.0, 1.0, 0.0])[:3]
     monkeypatch.setattr(
         "freepath.scene.volumes.openvdb.read_openvdb",
-        lambda *_: (np.ones((2, 2, 2)), flat, (0, 0, 0), ""),
+        lambda path, _: Volume(path, np.ones((2, 2, 2)), flat),
     )
     (tmp_path / "v.vdb").write_text("never read")
     with pytest.raises(VolumeError, match="its transform cannot be inverted"):

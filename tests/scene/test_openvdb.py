@@ -1,14 +1,16 @@
 import struct
 import subprocess
 import sys
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from freepath.errors import VolumeError
-from freepath.scene import build_medium
+from freepath.scene import build_medium, segments
 from freepath.scene.volumes import openvdb, openvdb_header, openvdb_reader
+from freepath.scene.volumes.reading import read_volume
 from scene.helpers import volume_model
 
 MAKE_GRIDS = """
@@ -95,18 +97,20 @@ def one_reader(request, monkeypatch, tmp_path):
 @pytest.mark.usefixtures("one_reader")
 class TestBothReaders:
     def test_densities_and_transform(self, grids):
-        densities, to_world, first, _ = openvdb.read_openvdb(grids / "many.vdb", None)
+        volume = openvdb.read_openvdb(grids / "many.vdb", None)
         expected = np.arange(5 * 7 * 9).reshape(5, 7, 9).transpose(2, 1, 0)
-        assert densities.tolist() == expected.tolist()
+        assert volume.densities.tolist() == expected.tolist()
+        assert sorted(volume.others) == ["empty", "tiles", "velocity (of vec3s)"]
         # the centre of the first voxel is index (-3, 2, 10); i goes along y, j against x
-        assert first == (10, 2, -3)
+        assert volume.first == (10, 2, -3)
+        to_world = volume.to_world
         center = to_world @ [0.5, 0.5, 0.5, 1.0]
         assert center.tolist() == [1 - 2 * 0.5, 2 - 3 * 0.25, 3 + 10 * 2]
         assert to_world[:, :3].tolist() == [[0, -0.5, 0], [0.25, 0, 0], [0, 0, 2]]
 
     def test_a_grid_by_name_with_constant_tiles(self, grids):
         for file, name in [("many.vdb", "tiles"), ("one.vdb", None)]:
-            densities, *_ = openvdb.read_openvdb(grids / file, name)
+            densities = openvdb.read_openvdb(grids / file, name).densities
             expected = np.zeros((16, 16, 19))
             expected[:, :, :16] = 2.5
             expected[:2, :2, 17:] = 1.0
@@ -172,9 +176,8 @@ class TestBothReaders:
             openvdb.read_openvdb(grids / "many.vdb", "density")
 
     def test_the_real_cloud_is_its_npy_voxel_for_voxel(self, real_volumes):
-        densities, to_world, *_ = openvdb.read_openvdb(
-            real_volumes / "wdas_cloud_sixteenth.vdb", None
-        )
+        volume = openvdb.read_openvdb(real_volumes / "wdas_cloud_sixteenth.vdb", None)
+        densities, to_world = volume.densities, volume.to_world
         expected = np.load(real_volumes / "cloud_wdas16.npy")
         assert densities.dtype == expected.dtype
         assert np.array_equal(densities, expected)
@@ -352,6 +355,19 @@ vdb.write(sys.argv[1] + "/one.vdb", grids=grids[:1])
 vdb.write(sys.argv[1] + "/level.vdb", grids=[vdb.createLevelSetSphere(5.0)])
 grids[0].fill((1200, 1200, 1200), (1200, 1200, 1200), 1.0)
 vdb.write(sys.argv[1] + "/empty.vdb", grids=grids[:1])
+endless = vdb.FloatGrid(background=0.25)
+endless.name = "density"
+endless.fill((2, 3, 4), (3, 3, 4), 1.5)
+endless["a note"] = "of any length"
+rows = [[1, 0.5, 0, 0], [0, 2, 0, 0], [0, 0, 3, 0], [1, 2, 3, 1]]
+turned = [[0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
+moved, scaled = vdb.createLinearTransform(0.5), vdb.createLinearTransform()
+moved.translate((1, 2, 3))
+scaled.scale((1, 2, 3))
+for number, one in enumerate([moved, scaled, rows, turned, 2.0]):
+    chosen = one if isinstance(one, vdb.Transform) else vdb.createLinearTransform(one)
+    endless.transform = chosen
+    vdb.write(sys.argv[1] + f"/endless{number}.vdb", grids=[endless])
 """
 
 
@@ -383,8 +399,9 @@ class TestOddFiles:
         ],
     )
     def test_what_can_be_read_is(self, odd, file, grid, value):
-        densities, _, _, told = openvdb.read_openvdb(odd / file, grid)
-        assert densities.tolist() == np.full((2, 3, 4), value).tolist()
+        volume = openvdb.read_openvdb(odd / file, grid)
+        assert volume.densities.tolist() == np.full((2, 3, 4), value).tolist()
+        told = volume.told
         assert "of float, active box [0, 0, 0] to [3, 2, 1] [x, y, z], background " in told
         assert ("got version 225" in told) == (file == "newer.vdb")
 
@@ -392,6 +409,10 @@ class TestOddFiles:
         wanted = "grid density is of int32, which (pyopenvdb|OpenImageIO) cannot read"
         with pytest.raises(VolumeError, match=wanted):
             openvdb.read_openvdb(odd / "whole.vdb", None)
+
+    def test_a_background_that_would_never_end_is_refused(self, odd):
+        with pytest.raises(VolumeError, match="its background is 0.25: outside of its active box"):
+            read_volume(odd / "endless0.vdb")
 
     def test_a_box_that_is_not_in_the_file(self, odd):
         with pytest.raises(VolumeError, match="box has 1732323601 voxels, 6.45 GiB, hardly any in"):
@@ -415,3 +436,34 @@ def test_the_reader_needs_nothing_of_freepath():
         for line in Path(openvdb_reader.__file__).read_text().splitlines()
         if line.startswith(("import ", "from "))
     }
+
+
+def test_a_background_is_found_behind_every_transform(odd, monkeypatch):
+    for number in range(5):
+        path = odd / f"endless{number}.vdb"
+        (entry,) = openvdb_header.contents(path)
+        assert openvdb_header.background(path, entry) == 0.25
+    monkeypatch.setattr(openvdb_header, "MAP_BYTES", {})
+    assert openvdb_header.background(path, entry) is None
+
+
+def test_rays_that_leave_the_active_box_leave_the_medium(odd):
+    medium = build_medium(volume_model(odd / "one.vdb", sigma_t=2.0))
+    origins = np.array([[1.0, 1, 0], [1, 1, -9], [1, 1, 2], [9, 1, 0]])
+    directions = np.tile([0.0, 0.0, 1.0], (4, 1))
+    found = medium.optical_depth(segments(origins, directions, medium))
+    # the box is 2 long and centred at 0.5; from its middle, from outside, behind it, beside it
+    assert found.tolist() == [2 * 1.5 * length for length in (1.5, 2, 0, 0)]
+
+
+def test_what_a_name_claims_is_not_allocated(tmp_path):
+    content = table((b"density", FLOAT, 0, 0))
+    place = content.index(b"density") - 4
+    (tmp_path / "v.vdb").write_bytes(content[:place] + b"\xff" * 4 + content[place + 4 :])
+    tracemalloc.start()
+    try:
+        with pytest.raises(VolumeError, match="is truncated"):
+            openvdb_header.contents(tmp_path / "v.vdb")
+        assert tracemalloc.get_traced_memory()[1] < 1 << 27
+    finally:
+        tracemalloc.stop()

@@ -160,7 +160,7 @@ def test_too_many_voxels_are_refused(tmp_path, monkeypatch):
 
 def test_only_openvdb_has_named_grids(tmp_path):
     np.save(tmp_path / "v.npy", DENSITIES)
-    with pytest.raises(VolumeError, match="grid 'density': only OpenVDB files have named grids"):
+    with pytest.raises(VolumeError, match="grid 'density': only OpenVDB and NanoVDB files"):
         read_volume(tmp_path / "v.npy", "density")
 
 
@@ -235,10 +235,10 @@ def test_a_pipe_is_not_waited_for(tmp_path):
         find_file(tmp_path / "v.npy")
 
 
-@pytest.mark.parametrize("name", ["v.nvdb", "v.npz", "v.vol", "v.npy.gz", "v.raw", "v"])
+@pytest.mark.parametrize("name", ["v.npz", "v.npy.gz", "v.raw", "v"])
 def test_which_formats_are_read_is_told(tmp_path, name):
     (tmp_path / name).write_bytes(b"\x1f\x8b" + bytes(100))
-    with pytest.raises(VolumeError, match=r"expected .npy, EXR, TIFF or OpenVDB \(.vdb\)$"):
+    with pytest.raises(VolumeError, match=r"expected .npy, EXR, .* or raw numbers, whose"):
         read_volume(tmp_path / name)
 
 

@@ -26,7 +26,7 @@ def search_of(options: argparse.Namespace) -> recommend.Search:
         catalog.load(),
         one_device([options.device] if options.device else []),
         options.output,
-        {"volume": volume_of(options.volume, options.sigma_t)},
+        {"volume": volume_of(options.volume, options.sigma_t)[1]},
         options.estimand,
         options.accuracy,
         options.budget,

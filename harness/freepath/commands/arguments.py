@@ -60,6 +60,23 @@ def add_timeout(command: Any) -> None:
     )
 
 
+def add_volume(command: Any) -> None:
+    """The file of a volume, and what of it."""
+    told = "a file in one of the formats that docs/files.md lists, such as .vdb or .npy"
+    command.add_argument("volume", type=Path, metavar="VOLUME", help=told).complete = shtab.FILE
+    command.add_argument("--grid", metavar="NAME", help="which grid of an OpenVDB or NanoVDB file")
+    told = "of raw numbers: voxels along x, y, z, type and byte order, as '8x9x10 uint16 big'"
+    command.add_argument("--raw", type=_raw, metavar="WHAT", help=told)
+
+
+def _raw(text: str) -> str:
+    from freepath.config.models import RAW, RAW_EXPECTED
+
+    if not re.fullmatch(RAW, text):
+        raise argparse.ArgumentTypeError(f"expected {RAW_EXPECTED}, got '{text}'")
+    return text
+
+
 def add_sigma_t(command: Any) -> None:
     """--sigma-t; None where it is not given, which stands for 1."""
     told = "extinction where the volume's density is 1 (default: 1)"

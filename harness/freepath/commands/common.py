@@ -20,6 +20,10 @@ if TYPE_CHECKING:
     from freepath.cases.plan import Case
     from freepath.compose.catalog import Catalog
     from freepath.config import Config
+    from freepath.scene.volumes.reading import Volume
+
+Keys = dict[str, Any]
+"""Of a volume, in a config."""
 
 
 def cases_of(options: Namespace) -> tuple[Config, Catalog, list[Case]]:
@@ -35,10 +39,11 @@ def cases_of(options: Namespace) -> tuple[Config, Catalog, list[Case]]:
     return loaded, known, cases
 
 
-def volume_of(file: Path, sigma_t: float, grid: str | None = None) -> dict[str, Any]:
-    """A volume of the command line as a config names it, found where `run` finds those of a config.
+def volume_of(file: Path, sigma_t: float | None, **how: str | None) -> tuple[Volume, Keys]:
+    """A volume of the command line, and the keys by which a config names it.
 
-    Raises VolumeError where it is none.
+    It is found where `run` finds those of a config; `how` are its `grid` and `raw`. Raises
+    VolumeError where it is none.
     """
     from freepath.errors import VolumeError
     from freepath.scene.volumes.files import find_file
@@ -47,10 +52,11 @@ def volume_of(file: Path, sigma_t: float, grid: str | None = None) -> dict[str, 
     file = find_file(file.absolute() if os.path.lexists(file) else file)
     if not str(file).isprintable():
         raise VolumeError(f"{ascii(str(file))}: expected a name of characters that can be printed")
-    if not read_volume(file, grid).densities.any():
+    volume = read_volume(file, **how)
+    if not volume.densities.any():
         raise VolumeError(f"{file}: is empty: expected a density above 0 in a voxel at least")
-    named = {} if grid is None else {"grid": grid}
-    return {"file": str(file.resolve()), "sigma_t": sigma_t, **named}
+    named = {name: value for name, value in how.items() if value is not None}
+    return volume, {"file": str(file.resolve()), "sigma_t": sigma_t or 1.0, **named}
 
 
 MARK = ".freepath-made"

@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import argparse
 from argparse import Namespace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-import shtab
 
 from freepath.commands.arguments import (
     add_baseline,
@@ -16,6 +13,7 @@ from freepath.commands.arguments import (
     add_sigma_t,
     add_timeout,
     add_trackers,
+    add_volume,
     expression,
     number_or_percent,
     positive,
@@ -40,9 +38,7 @@ def add(commands: Any) -> None:
         "what comes next. Writes a config that measures them again.",
         allow_abbrev=False,
     )
-    recommend.add_argument(
-        "volume", type=Path, metavar="VOLUME", help="a .vdb, .exr, .tif or .npy file"
-    ).complete = shtab.FILE
+    add_volume(recommend)
     recommend.add_argument(
         "--accuracy",
         type=_accuracy,
@@ -63,7 +59,6 @@ def add(commands: Any) -> None:
         choices=("mitsuba", "pbrt", "cycles"),
         help="recommend what this renderer has, with its settings, and what the rest would gain",
     )
-    recommend.add_argument("--grid", metavar="NAME", help="which grid of an OpenVDB file")
     recommend.add_argument(
         "--budget",
         type=positive,
@@ -110,7 +105,8 @@ def execute(options: Namespace) -> int:
     from freepath.show import answers
 
     clock = Clock()
-    medium = {"volume": volume_of(options.volume, options.sigma_t or 1.0, options.grid)}
+    _, keys = volume_of(options.volume, options.sigma_t, grid=options.grid, raw=options.raw)
+    medium = {"volume": keys}
     known = catalog.load(options.trackers)
     part = first(options.device)
     folder = options.output or new_folder(f"recommend-{options.volume.stem[:60]}")

@@ -38,7 +38,7 @@ def add(commands: Any) -> None:
         "--volume",
         type=Path,
         metavar="FILE",
-        help="measure it on this volume too: .vdb, .exr, .tif or .npy",
+        help="measure it on this volume too",
     ).complete = shtab.FILE
     add_sigma_t(trying)
     trying.add_argument(
@@ -66,7 +66,7 @@ def execute(options: Namespace) -> int:
     from freepath.results.folder import new_folder, write
 
     known, tracker, parent = candidate.read(options.tracker, options.like)
-    volume = volume_of(options.volume, options.sigma_t or 1.0) if options.volume else None
+    volume = volume_of(options.volume, options.sigma_t)[1] if options.volume else None
     path = options.output or new_folder(f"try-{tracker.name}")
     device, part = one_device(options.device), first(options.device)
     console = console_of()

@@ -15,6 +15,8 @@ MOST_CELLS = 2**27
 LARGEST_IMAGE = 4096
 MOST_CHANNELS = 32
 PHASES = ("henyey_greenstein", "rod")
+RAW = r"([1-9]\d{0,9}x){2}[1-9]\d{0,9} (u?int8|(u?int(16|32|64)|float(16|32|64)) (little|big))"
+RAW_EXPECTED = "voxels along x, y, z, a type and a byte order, such as '256x256x64 uint16 little'"
 
 CLOSED_FORM = frozenset({"closed_form"})
 CELLS = frozenset({"cells"})
@@ -222,7 +224,7 @@ class Cloud(Medium):
 
 
 class Volume(Medium):
-    """A grid from a file: .npy, multi-part EXR, multi-page TIFF or OpenVDB."""
+    """A grid from a file, in any of the formats that docs/files.md lists."""
 
     kind: ClassVar[str] = "volume"
     OFFERS: ClassVar[frozenset[str]] = CELLS
@@ -233,6 +235,8 @@ class Volume(Medium):
     """Scales the density."""
     grid: Annotated[str, Text("the name of a grid", blank=True)] | None = None
     """Which grid of an OpenVDB file; '' is one without a name, NAME[1] the second of a name."""
+    raw: Annotated[str, Text(RAW_EXPECTED, RAW)] | None = None
+    """Of raw numbers: voxels along x (fastest), y, z, type, byte order ('8x9x10 uint16 big')."""
     interpolation: Interpolation = "trilinear"
     """How the density is read between voxel centres."""
     voxel_size: Size | None = None

@@ -24,6 +24,7 @@ from freepath.measure.jobs import scenes_of
 from freepath.measure.ladder import Ladder
 from freepath.measure.sweep import Clock, Listener, Sweep
 from freepath.results.folder import RUN, SUMMARY, ResultFolder, Row, read_result, write
+from freepath.scene import survey
 from freepath.scene.volumes.reading import read_volume
 from freepath.show import answers
 from freepath.show.table import failures, number, uncertainty
@@ -216,7 +217,7 @@ class Search:
     def voxels(self) -> tuple[tuple[int, ...], float]:
         """Counts along x, y, z, and the shortest side in the world."""
         keys = self.medium["volume"]
-        volume = read_volume(Path(keys["file"]), keys.get("grid"))
+        volume = read_volume(Path(keys["file"]), keys.get("grid"), keys.get("raw"))
         sides = np.linalg.norm(volume.to_world[:, :3], axis=0)
         return tuple(reversed(volume.densities.shape)), float(sides.min())
 
@@ -299,13 +300,7 @@ class Search:
         """How dense the volume is along the rays of a sweep."""
         case = sweep.cases[0]
         scene = scenes_of([case], sweep.config.search_path)[case]
-        depths = scene.medium.optical_depth(scene.segments)
-        a_voxel = float(scene.bounds((1, 1, 1))[1].max()) * self.side
-        return (
-            f"optical depth along {len(depths)} rays: mean {depths.mean():.3g}, largest "
-            f"{depths.max():.3g}; of a voxel where it is densest {a_voxel:.3g} "
-            f"(a mean free path is {1 / a_voxel:.3g} voxels there)"
-        )
+        return str(survey.density(scene.medium, scene.segments, self.side))
 
     def keep(self) -> None:
         """Write the last rows of every case into the folder itself, for `freepath report`."""
@@ -347,12 +342,12 @@ class Search:
         lines = [
             "name: recommend",
             f"seed: {SEED}",
-            f"rays: {_json(RAYS)}",
+            f"rays: {as_yaml(RAYS)}",
             "matrix:",
-            *(f"  {axis}: {_json(value)}" for axis, value in matrix.items()),
+            *(f"  {axis}: {as_yaml(value)}" for axis, value in matrix.items()),
             *(["include:"] if others else []),
-            *(f"  - {_json(point)}" for point in others),
-            f"stop: {_json(stop)}",
+            *(f"  - {as_yaml(point)}" for point in others),
+            f"stop: {as_yaml(stop)}",
         ]
         return "\n".join(lines) + "\n"
 
@@ -365,8 +360,8 @@ class Search:
         return path
 
 
-def _json(value: Any) -> str:
-    """As YAML has it too: its escapes know no halves of a letter."""
+def as_yaml(value: Any) -> str:
+    """JSON that is YAML too, whose escapes know no halves of a letter."""
     return json.dumps(value, ensure_ascii=False)
 
 

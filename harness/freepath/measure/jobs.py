@@ -88,6 +88,7 @@ class Job:
         scene = scene.for_device(device.info)
         row = base_row(case, device.info, run_id)
         row["effects"] = composed_for(case, scene.medium.kernel)
+        row["inputs"] = "; ".join(inputs_of({case: scene}))
         row["rays"] = len(scene.segments)
         row["config_sha256"] = source.combined_hash(case.config_sha256, scene.fingerprint_of(case))
         names = [case.tracker, *([case.shadow.kind] if case.shadow else [])]

@@ -63,6 +63,8 @@ work_items int - of a launch of the timed kernel: fixed on CPUs, elsewhere the f
     calibration](devices.md#launch-geometry)
 work_group int - of these in a group, likewise or by `--work-group`
 params str - all parameters of the tracker, as JSON
+inputs str - [what was used of each file](files.md): of a volume its grid, type, box and background,
+    of an image its channels
 seed int - of all random numbers
 rays int - how many
 samples_per_ray int - in all measured rounds

@@ -15,7 +15,7 @@ from freepath.scene.media.formulas import Cosine, Exponential, Homogeneous, Laye
 from freepath.scene.media.gaussian import Gaussian
 from freepath.scene.media.grid import GridMedium
 from freepath.scene.volumes.files import find_file
-from freepath.scene.volumes.reading import extinction, read_volume
+from freepath.scene.volumes.reading import Volume, extinction, read_volume
 
 SearchPath = Iterable[str | Path]
 
@@ -67,7 +67,12 @@ def _cloud(model: Any, _: SearchPath) -> Medium:
 
 
 def _volume(model: Any, search_path: SearchPath) -> Medium:
-    volume = read_volume(find_file(model.file, search_path), model.grid)
+    path = find_file(model.file, search_path)
+    return medium_of(read_volume(path, model.grid, model.raw), model)
+
+
+def medium_of(volume: Volume, model: Any) -> GridMedium:
+    """Return the medium of a volume that was read, as a config's model describes it."""
     to_world = volume.to_world
     if model.voxel_size is not None:
         spacing = np.broadcast_to(np.asarray(model.voxel_size, dtype=np.float64), 3)

@@ -20,6 +20,10 @@ from freepath.scene.volumes.npy import MOST_VOXELS, first_line
 
 #: One or three numbers in the header of an EXR file's first part.
 VOXEL_SIZE_ATTRIBUTE = "freepath:voxel_size"
+FORMATS = (
+    "expected .npy, EXR, TIFF, OpenVDB (.vdb), NanoVDB (.nvdb), Mitsuba's .vol, pbrt's grid text "
+    "(.pbrt), or raw numbers, whose shape `raw` says"
+)
 TIFF_BEGINNINGS = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 SMALL = 1 << 26
 """Bytes that any file may claim to hold."""
@@ -46,7 +50,7 @@ def read_slices(path: Path) -> tuple[NDArray, NDArray[np.float64]]:
         kind = image.format_name()
         if kind != "openexr":
             # formats of a single image, or whose third dimension OpenImageIO does not read
-            raise VolumeError(f"{path}: expected .npy, EXR, TIFF or OpenVDB, got {kind}")
+            raise VolumeError(f"{path}: {FORMATS}, got {kind}")
         spacing = _voxel_size(path, image.spec())
         slices = _joined(path, list(_parts(path, image, oiio.UNKNOWN)))
     return slices, np.diag([*spacing, 0.0])[:3]
@@ -60,8 +64,7 @@ def opened(path: Path) -> Iterator[Any]:
     try:
         image = oiio.ImageInput.open(str(path))
         if image is None:
-            formats = "expected .npy, EXR, TIFF or OpenVDB (.vdb)"
-            raise VolumeError(f"{path}: is not an image: {first_line(oiio.geterror())}; {formats}")
+            raise VolumeError(f"{path}: is not an image: {first_line(oiio.geterror())}; {FORMATS}")
         try:
             yield image
         finally:

@@ -21,7 +21,8 @@ from freepath.errors import VolumeError
 from freepath.scene.volumes import openvdb_reader
 from freepath.scene.volumes.images import MOST_COMPRESSED, SMALL
 from freepath.scene.volumes.npy import MOST_VOXELS
-from freepath.scene.volumes.openvdb_header import Entry, choose, contents
+from freepath.scene.volumes.openvdb_header import Entry, background, choose, contents
+from freepath.scene.volumes.reading import Volume
 
 SYSTEM_PYTHON = "/usr/bin/python3"
 HOW_TO_INSTALL = (
@@ -35,15 +36,12 @@ MEMORY = 3 << 29
 """Bytes of address space that a reader takes before it has read anything, and more than that."""
 
 
-def read_openvdb(
-    path: Path, grid: str | None
-) -> tuple[NDArray, NDArray[np.float64], tuple[int, int, int], str]:
-    """Return the densities of a grid's active box, voxels to world (3, 4), first index, and what.
+def read_openvdb(path: Path, grid: str | None) -> Volume:
+    """Return a grid's active box, with what the library warned of.
 
-    Densities and index are [z, y, x]; the text names grid, type, box, background, and what the
-    library warned of. By OpenVDB's own module or an OpenImageIO that reads OpenVDB, of this Python
-    or the system's, in a process with limits of memory and time. Raises VolumeError where nothing
-    reads the file, or where it or the grid cannot be used.
+    By OpenVDB's own module or an OpenImageIO that reads OpenVDB, of this Python or the system's, in
+    a process with limits of memory and time. Raises VolumeError where nothing reads the file, or
+    where it or the grid cannot be used.
     """
     grids = contents(path)
     size = path.stat().st_size
@@ -61,13 +59,18 @@ def read_openvdb(
         raise VolumeError(f"{path}: {what if readers else HOW_TO_INSTALL}")
     matrix = np.asarray(answer["transform"], dtype=np.float64)
     # OpenVDB multiplies row vectors; its indices are voxel centres, ours their lower corners
-    minimum, maximum, background = (answer[k] for k in ("minimum", "maximum", "background"))
     to_world = matrix[:, :3].T.copy()
-    to_world[:, 3] += to_world[:, :3] @ (np.asarray(minimum) - 0.5)
-    told = f"grid {entry} of {entry.kind}, active box {minimum} to {maximum} [x, y, z]"
-    told += f", background {'unknown' if background is None else f'{background:g}'}"
-    told += f"; OpenVDB says: {words}" if words else ""
-    return voxels, to_world, tuple(int(i) for i in reversed(minimum)), told
+    to_world[:, 3] += to_world[:, :3] @ (np.asarray(answer["minimum"]) - 0.5)
+    return Volume(
+        path,
+        voxels,
+        to_world,
+        tuple(int(i) for i in reversed(answer["minimum"])),
+        f"grid {entry} of {entry.kind}",
+        background(path, entry) if answer["background"] is None else answer["background"],
+        tuple(str(one) for one in grids or () if one != entry),
+        f"OpenVDB says: {words}" if words else "",
+    )
 
 
 def interpreters() -> list[str]:

@@ -11,6 +11,14 @@ from freepath.errors import VolumeError
 MAGIC = 0x56444220
 OLDEST_KNOWN = 222  # the file format of OpenVDB 2.1 (2013) and later
 SCALARS = ("float", "double", "half", "int32", "int64")
+SCALARS += ("int16", "uint32", "Fp4", "Fp8", "Fp16", "FpN")  # of NanoVDB alone
+VALUES = {"float": "f", "double": "d", "int32": "i", "int64": "q"}
+MAP_BYTES = dict.fromkeys(("ScaleMap", "UniformScaleMap"), 120)
+MAP_BYTES |= dict.fromkeys(("ScaleTranslateMap", "UniformScaleTranslateMap"), 144)
+MAP_BYTES |= {"TranslationMap": 24, "AffineMap": 128, "UnitaryMap": 128}
+"""How many bytes a transform has in a file."""
+LONGEST = 1 << 26
+"""Bytes of a text, or of what else a file says of a grid."""
 COUNT_MARK = "\x1e"  # between a name and the count of those that are the same
 
 
@@ -56,6 +64,26 @@ def contents(path: Path) -> list[Entry] | None:
     if any(not 0 <= grid.start <= grid.end <= size for grid in grids or ()):
         raise VolumeError(f"{path}: is truncated, its grids go on beyond its end")
     return grids
+
+
+def background(path: Path, entry: Entry) -> float | None:
+    """Return what a grid's tree says is outside of it; None where this does not find it.
+
+    The layout is that of OpenVDB's Archive::readGrid: compression, metadata, transform, tree.
+    """
+    if entry.kind not in VALUES:
+        return None
+    with path.open("rb") as file:
+        try:
+            file.seek(entry.start + 4)
+            (count,) = _read(file, "I")
+            for _ in range(count):
+                _string(file), _string(file)  # name and type
+                _string(file)  # the value, which begins with its size
+            file.seek(MAP_BYTES[_string(file)] + 4, 1)  # and how many buffers a voxel has
+            return float(_read(file, VALUES[entry.kind])[0])
+        except (struct.error, KeyError, OSError, OverflowError):
+            return None
 
 
 def choose(path: Path, grids: list[Entry], wanted: str | None) -> Entry:
@@ -109,7 +137,7 @@ def _read(file: BinaryIO, form: str) -> tuple[Any, ...]:
 
 def _string(file: BinaryIO) -> str:
     (length,) = _read(file, "I")
-    text = file.read(length)
+    text = file.read(min(length, LONGEST))
     if len(text) < length:
         raise struct.error
     return text.decode("utf-8", "replace")

@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 from freepath.errors import VolumeError
 from freepath.scene.volumes.npy import MOST_VOXELS, open_npy
 
+WITH_GRIDS = (".vdb", ".nvdb")
+ARRAYS = (".vol", ".pbrt")
+
 
 @dataclass(frozen=True)
 class Volume:
@@ -25,38 +28,68 @@ class Volume:
     to_world: NDArray[np.float64]
     first: tuple[int, int, int] = (0, 0, 0)
     """The index of the first voxel in the file's own count, [z, y, x]."""
-    told: str = ""
-    """What of which file it is."""
+    grid: str = ""
+    """The grid's name and type, where the format has grids."""
+    background: float | None = 0.0
+    """What the file says is outside of the box; None where that is not known."""
+    others: tuple[str, ...] = ()
+    """The other grids of the file."""
+    remark: str = ""
+    """What else is to be said."""
+
+    @property
+    def told(self) -> str:
+        """What of which file it is."""
+        shape = self.densities.shape
+        text = f"{' x '.join(map(str, shape))} voxels [z, y, x] of {self.densities.dtype}"
+        if self.grid:
+            low = list(reversed(self.first))
+            high = [a + b - 1 for a, b in zip(low, reversed(shape), strict=True)]
+            outside = "unknown" if self.background is None else f"{self.background:g}"
+            text = f"{self.grid}, active box {low} to {high} [x, y, z], background {outside}"
+        return f"{self.path}: {text}{self.remark and f'; {self.remark}'}"
 
 
-def read_volume(path: Path, grid: str | None = None) -> Volume:
-    """Read a .npy, a multi-part EXR, a multi-page TIFF or a grid of an OpenVDB file.
+def read_volume(path: Path, grid: str | None = None, raw: str | None = None) -> Volume:
+    """Read a file in a format that docs/files.md lists, by its suffix.
 
-    `grid` names the grid of an OpenVDB file ('' one without a name, `density[1]` the second of that
-    name); without it, the one called `density` or the only grid of scalars. Raises VolumeError,
-    with the file in its message.
+    `grid` names a grid of OpenVDB or NanoVDB ('' one without a name, `density[1]` the second of
+    that name); without it, the one called `density` or the only grid of scalars. `raw` says what
+    raw numbers are, see `read_raw`. Raises VolumeError, with the file in its message.
     """
     suffix = path.suffix.lower()
-    first, told = (0, 0, 0), ""
-    if grid is not None and suffix != ".vdb":
-        raise VolumeError(f"{path}: grid {grid!r}: only OpenVDB files have named grids")
-    if suffix == ".npy":
-        densities, to_world = open_npy(path), np.eye(3, 4)
-        if densities.ndim != 3:
-            found = f"{densities.ndim}, its shape is {densities.shape}"
+    if grid is not None and suffix not in WITH_GRIDS:
+        raise VolumeError(f"{path}: grid {grid!r}: only OpenVDB and NanoVDB files have named grids")
+    if raw is not None or suffix in ARRAYS:
+        from freepath.scene.volumes import arrays
+
+        if raw is not None:
+            volume = arrays.read_raw(path, raw)
+        else:
+            volume = arrays.read_vol(path) if suffix == ".vol" else arrays.read_pbrt(path)
+    elif suffix == ".npy":
+        volume = Volume(path, open_npy(path), np.eye(3, 4))
+        if volume.densities.ndim != 3:
+            found = f"{volume.densities.ndim}, its shape is {volume.densities.shape}"
             raise VolumeError(f"{path}: expected an array of rank 3 [z, y, x], got rank {found}")
     elif suffix == ".vdb":
         from freepath.scene.volumes.openvdb import read_openvdb
 
-        densities, to_world, first, told = read_openvdb(path, grid)
+        volume = read_openvdb(path, grid)
+    elif suffix == ".nvdb":
+        from freepath.scene.volumes.nanovdb import read_nanovdb
+
+        volume = read_nanovdb(path, grid)
     else:
         from freepath.scene.volumes.images import read_slices
 
-        densities, to_world = read_slices(path)
-    if densities.size > MOST_VOXELS:
-        raise VolumeError(f"{path}: {densities.size} voxels, expected at most {MOST_VOXELS}")
-    told = told or f"{' x '.join(map(str, densities.shape))} voxels [z, y, x] of {densities.dtype}"
-    return Volume(path, densities, to_world, first, f"{path}: {told}")
+        volume = Volume(path, *read_slices(path))
+    if volume.densities.size > MOST_VOXELS:
+        raise VolumeError(f"{path}: {volume.densities.size} voxels, expected at most {MOST_VOXELS}")
+    if volume.background:
+        endless = "outside of its active box the medium would never end; expected 0"
+        raise VolumeError(f"{path}: its background is {volume.background:g}: {endless}")
+    return volume
 
 
 def extinction(
