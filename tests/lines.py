@@ -10,12 +10,12 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "harness" / "freepath"
 BUDGET = {
-    "checks": 4600,
-    "kernels": 3100,
+    "checks": 4710,
+    "kernels": 3400,
     "scene": 3000,
     "show": 3150,
-    "measure": 2620,
-    "config": 2100,
+    "measure": 2625,
+    "config": 2108,
     "commands": 1700,
     "device": 1400,
     "compose": 1000,

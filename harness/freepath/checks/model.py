@@ -20,6 +20,11 @@ what else is selected nor on which trackers were added."""
 LEVEL = sidak(BUDGET, MOST_CHECKS)
 
 TINY = "tiny"
+FURTHER = frozenset(
+    ("collision", "decomposition_factored", "hybrid", "jackknife", "resampled"),
+)
+"""Trackers whose hard cases are slow, and left to `freepath check` but for what is derived of them:
+the same walks and media are met by their relatives."""
 GROUPS = (
     *("random-numbers", "empty-full", "thin", "thick", "non-bounding", "loose", "residual"),
     *("geometry", "scale", "contrast", "accumulation", "long-runs", "scattering", "p_absorb"),
@@ -66,6 +71,8 @@ class Check:
         """
         own = {key: options.pop(key) for key in ("applies", "kernels") if key in options}
         sentence = options.pop("sentence", function.__doc__ or "")
+        if FURTHER.intersection(labels) and "hard" in labels:
+            labels = ("slow", *(label for label in labels if label != "fast"))
         return cls(name, labels, " ".join(sentence.split()), partial(function, **options), **own)
 
     def reason_against(self, info: DeviceInfo) -> str:
@@ -76,8 +83,9 @@ class Check:
 
     @property
     def in_tests(self) -> bool:
-        """Whether the tests run it too: all but those that take minutes."""
-        return "minutes" not in self.labels
+        """Whether the tests run it too: not what takes minutes, nor all of FURTHER trackers."""
+        further = FURTHER.intersection(self.labels) and "slow" in self.labels
+        return "minutes" not in self.labels and not (further and "moments" not in self.labels)
 
 
 def majorant_of(tracker: Tracker, wanted: str = "grid") -> str:

@@ -67,7 +67,8 @@ def one_voxel(rig: Rig, alpha: float, tracker: Tracker) -> None:
     directions = unit(offsets[0])
     starts = [centre - 2.0 * directions, centre - 2.0 * directions + 0.2 * unit(offsets[1])]
     lines = np.concatenate(starts), np.tile(directions, (2, 1))
-    marching = {"step": 0.25 / ONE_IN} if "step" in tracker.parameters else {}
+    fine = {"step": 0.25 / ONE_IN} if "step" in tracker.parameters else {"steps": ONE_IN}
+    marching = {} if tracker.unbiased else fine
     medium = rig.volume(values, voxel_size=1 / ONE_IN)
     flight = fly(rig, tracker, medium, lines=lines, parameters=marching)
     samples = flight.record(1024)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +12,9 @@ from freepath.checks.rig import Flight
 from freepath.scene import majorants
 
 Array = NDArray[np.float64]
-Expected = tuple[Array | None, Array]
-"""The mean of the squared score, where it has a formula, and of the lookups: of each ray."""
+Expected = tuple[Array | None, Array] | tuple[Array | None, Array, Array]
+"""The mean of the squared score, where it has a formula, and of the lookups: of each ray. Of a
+biased estimator, the mean of its score too."""
 
 POINTS = 2048
 """Of the midpoint rule along a ray: its error is far below that of the samples."""
@@ -23,11 +25,15 @@ class AlongRays:
 
     def __init__(self, flight: Flight):
         segments = flight.segments
+        self.flight = flight
         self.step = segments[:, 6:] / POINTS
         t = (np.arange(POINTS) + 0.5) * self.step
         points = segments[:, None, :3] + t[..., None] * segments[:, None, 3:6]
         self.sigma = flight.medium.sigma_t(points.reshape(-1, 3)).reshape(t.shape)
         case = flight.case
+        self.params = case.params
+        if case.majorant is None:
+            return
         control = case.params if "control" in flight.tracker.needs else None
         bounds = flight.medium.bounds((1, 1, 1))
         numbers = majorants.build(
@@ -103,3 +109,63 @@ def track_length_cost(along: AlongRays) -> Expected:
 def cost_of(known: Callable[[AlongRays], Expected]) -> Callable[[AlongRays], Expected]:
     """Lookups as those of another; no formula of the variance."""
     return lambda along: (None, known(along)[1])
+
+
+def jackknife(along: AlongRays) -> Expected:
+    """Two marches: products over their intervals, each of a mean."""
+    steps = int(along.params["steps"])
+    pieces = along.sigma * along.step * (POINTS // steps)
+    pieces = pieces.reshape(len(pieces), steps, -1)
+
+    def march(k: complex) -> Any:
+        return np.exp(-k * pieces).mean(axis=2).prod(axis=1)
+
+    second = (march(1.0) ** 2 + np.abs(march(1.0 + 1.0j)) ** 2) / 2.0
+    lookups = np.full(len(pieces), 2.0 * steps)
+    return second, lookups, np.abs(march(0.5 + 0.5j)) ** 2
+
+
+def resampled(along: AlongRays) -> Expected:
+    """Ratio tracking, which a flight with a candidate leaves by 1 - scatter."""
+    second, lookups = ratio(along)[:2]
+    none = np.exp(-along.integral(along.majorant * (along.sigma > 0.0)))
+    return (second - none) / (1.0 - along.params["scatter"]) + none, lookups
+
+
+def collision(along: AlongRays) -> Expected:
+    """Each collision with itself, and with all that are still to come."""
+    share, left = along.sigma / along.majorant, along.sigma * along.step
+    reached = np.exp(-(np.cumsum(left, axis=1) - 0.5 * left))
+    still = 1.0 - along.transmittance[:, None] / reached
+    square = along.integral(along.sigma * reached * (share + 2.0 * (1.0 - share) * still))
+    return square - 1.0 + 2.0 * along.transmittance, binary(along)[1]
+
+
+def factored(along: AlongRays) -> Expected:
+    """Delta tracking of the residual, times what the control lets through."""
+    residual = along.sigma - along.control
+    through = np.exp(-along.integral(0.0 * residual + along.control))
+    lookups = along.until(0.0 * residual + along.majorant, residual)
+    return along.transmittance * through, lookups
+
+
+def hybrid(along: AlongRays) -> Expected:
+    """Backwards through constant cells: of flights (f) and of walks (w), from a cell's start on."""
+    medium, segments, majorant = along.flight.medium, along.flight.segments, along.majorant
+    pieces = medium.pieces(segments)
+    f, w, f_lookups, w_lookups = (np.full(len(segments), value) for value in (1.0, 1.0, 0.0, 0.0))
+    for start, span in zip(pieces.start.T[::-1], pieces.length.T[::-1], strict=True):
+        there = segments[:, :3] + (start + 0.5 * span)[:, None] * segments[:, 3:6]
+        sigma, some = medium.sigma_t(there), span > 0.0
+        thin = sigma < along.params["threshold"] * majorant
+        hit, lost = -np.expm1(-majorant * span), -np.expm1(-sigma * span)
+        null, rate = 1.0 - sigma / majorant, majorant - 2.0 * sigma
+        walked = np.exp(-2.0 * sigma * span) * w
+        begun = (majorant - sigma) * walked * -np.expm1(-rate * span) / rate
+        f = np.where(some, np.where(thin, (1.0 - hit) * f + begun, (1.0 - lost) * f), f)
+        w = np.where(some, np.where(thin, walked, f), w)
+        thick = (1.0 - lost) * f_lookups + majorant * lost / np.where(thin, 1.0, sigma)
+        begun = (1.0 - hit) * f_lookups + hit * (1.0 + null * (1.0 + w_lookups))
+        f_lookups = np.where(some, np.where(thin, begun, thick), f_lookups)
+        w_lookups = np.where(some, 1.0 + np.where(thin, w_lookups, f_lookups), w_lookups)
+    return f, f_lookups

@@ -38,6 +38,11 @@ RELATIVES: dict[str, tuple[dict[str, Any], float, Callable[..., known.Expected]]
     "next_flight_delta": ({}, 1.5, known.cost_of(known.binary)),
     "next_flight_ratio": ({}, 1.5, known.cost_of(known.ratio)),
     "track_length": ({}, 1.5, known.track_length_cost),
+    "jackknife": ({}, 1, known.jackknife),
+    "resampled": ({"scatter": 0.3}, 1.5, known.resampled),
+    "collision": ({}, 1.5, known.collision),
+    "decomposition_factored": ({}, 1.5, known.factored),
+    "hybrid": ({"threshold": 0.3}, 1.5, known.hybrid),
 }  # fmt: skip
 
 
@@ -51,7 +56,7 @@ def checks(catalog: Catalog) -> Iterator[Check]:
                 yield _check(f"{tracker}/{medium}/{majorant}", tracker, axes, expected)
     for name, (parameters, tightness, known_of) in RELATIVES.items():
         tracker = name.partition("-")[0]
-        for medium in ("exponential", "trilinear"):
+        for medium in ("layered",) if tracker == "hybrid" else ("exponential", "trilinear"):
             axes = {"tracker": {tracker: parameters}, "medium": medium, "tightness": tightness}
             expected = partial(_relative, known_of)
             yield _check(f"{name}/{medium}/global", tracker, axes | {"lanes": 16}, expected)
@@ -66,8 +71,9 @@ def _check(name: str, tracker: str, axes: dict[str, Any], expected: Any) -> Chec
 
 def _relative(known_of: Callable[..., known.Expected], flight: Flight) -> known.Expected:
     along = known.AlongRays(flight)
-    second, lookups = known_of(along)
-    return None if second is None else second - along.transmittance**2, lookups
+    second, lookups, *mean = known_of(along)
+    square = np.square(mean[0] if mean else along.transmittance)
+    return None if second is None else second - square, lookups, *mean
 
 
 def as_derived(
@@ -76,9 +82,9 @@ def as_derived(
     """An estimator may be right on average and play where it should weigh, or look up twice: its
     variance and its lookups must be those that are derived for it."""
     flight = rig.flight(**axes)
-    variance, lookups = expected(flight)
+    variance, lookups, *mean = expected(flight)
     samples = flight.record(SAMPLES)
-    check_mean(samples.round.moments, flight.reference(), alpha / 3)
+    check_mean(samples.round.moments, mean[0] if mean else flight.reference(), alpha / 3)
     check_count(samples.lookups, lookups, alpha / 3)
     thin = flight.depth <= THICKEST
     demand(np.count_nonzero(thin) > 100, "too few rays are thin enough")
