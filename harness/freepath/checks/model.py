@@ -21,7 +21,10 @@ LEVEL = sidak(BUDGET, MOST_CHECKS)
 
 TINY = "tiny"
 FURTHER = frozenset(
-    ("collision", "decomposition_factored", "hybrid", "jackknife", "resampled"),
+    (
+        *("biased_march", "collision", "decomposition_factored", "hybrid", "jackknife"),
+        *("production_march", "resampled"),
+    ),
 )
 """Trackers whose hard cases are slow, and left to `freepath check` but for what is derived of them:
 the same walks and media are met by their relatives."""

@@ -69,10 +69,12 @@ class MajorantAlongRays:
         cuts, ends = self._cuts(), self._segments[:, 6:]
         return int(np.count_nonzero((cuts > 0.0) & (cuts < ends)))
 
-    def _points(self, t: Array) -> Array:
+    def points(self, t: Array) -> Array:
+        """The places at distances t (rays, samples)."""
         return self._segments[:, None, :3] + t[..., None] * self._segments[:, None, 3:6]
 
-    def _majorant(self, points: Array) -> Array:
+    def at(self, points: Array) -> Array:
+        """The majorant there."""
         share = points / self._medium.extent * self._cells
         i, j, k = np.moveaxis(np.clip(share.astype(int), 0, self._cells - 1), -1, 0)
         return self._upper[k, j, i]
@@ -80,12 +82,12 @@ class MajorantAlongRays:
     def tentative_collisions(self) -> Array:
         """The integral of the majorant: of a path that none of them stops."""
         start, length = partition(self._cuts(), self._segments[:, 6])
-        return (self._majorant(self._points(start + length / 2.0)) * length).sum(axis=1)
+        return (self.at(self.points(start + length / 2.0)) * length).sum(axis=1)
 
     def collisions_until_real(self) -> Array:
         """The integral of majorant x transmittance: of a path that ends at a real collision."""
         start, length = partition(self._cuts(), self._segments[:, 6])
-        majorant = self._majorant(self._points(start + length / 2.0))
+        majorant = self.at(self.points(start + length / 2.0))
         ends = np.column_stack([start, self._segments[:, 6]])
         flown = [free_path(self._medium, cut(self._segments, end)) for end in ends.T]
         return (majorant * np.diff(np.column_stack(flown), axis=1)).sum(axis=1)
@@ -95,10 +97,10 @@ class MajorantAlongRays:
         kinks = self._medium.pieces(self._segments).start
         cuts = np.concatenate([self._cuts(), kinks], axis=1)
         start, length = partition(cuts, self._segments[:, 6])
-        majorant = self._majorant(self._points(start + length / 2.0))
+        majorant = self.at(self.points(start + length / 2.0))
         total = np.zeros(len(self._segments))
         for node, weight in zip(NODES, WEIGHTS, strict=True):
-            points = self._points(start + node * length)
+            points = self.points(start + node * length)
             sigma = self._medium.sigma_t(points.reshape(-1, 3)).reshape(start.shape)
             share = np.divide(sigma**2, majorant, where=majorant > 0.0, out=np.zeros_like(sigma))
             total += weight * (share * length).sum(axis=1)

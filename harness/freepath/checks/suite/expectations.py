@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from freepath.checks.rig import Flight
+from freepath.checks.truth import MajorantAlongRays
 from freepath.scene import majorants
 
 Array = NDArray[np.float64]
@@ -18,6 +19,8 @@ biased estimator, the mean of its score too."""
 
 POINTS = 2048
 """Of the midpoint rule along a ray: its error is far below that of the samples."""
+OFFSETS = 256
+"""Of a comb of steps, that are averaged over."""
 
 
 class AlongRays:
@@ -32,7 +35,7 @@ class AlongRays:
         self.sigma = flight.medium.sigma_t(points.reshape(-1, 3)).reshape(t.shape)
         case = flight.case
         self.params = case.params
-        if case.majorant is None:
+        if case.majorant is None or case.majorant.kind != "global":
             return
         control = case.params if "control" in flight.tracker.needs else None
         bounds = flight.medium.bounds((1, 1, 1))
@@ -123,6 +126,49 @@ def jackknife(along: AlongRays) -> Expected:
     second = (march(1.0) ** 2 + np.abs(march(1.0 + 1.0j)) ** 2) / 2.0
     lookups = np.full(len(pieces), 2.0 * steps)
     return second, lookups, np.abs(march(0.5 + 0.5j)) ** 2
+
+
+def biased_march(along: AlongRays) -> Expected:
+    """One comb of equal steps, at many offsets; `matched` has a lookup at both ends too."""
+    medium, segments, length = (
+        along.flight.medium,
+        along.flight.segments,
+        along.flight.segments[:, 6],
+    )
+    whole = along.majorant * length
+    teeth = np.ceil(np.cbrt((0.015 + whole) * (0.65 + whole) * (60.3 + whole)))
+    matched = along.params["ends"] == "matched"
+    start, way = segments[:, :3], length[:, None] * segments[:, 3:6]
+    rise = medium.sigma_t(start + way) - medium.sigma_t(start)
+    tooth = np.arange(teeth.max())
+    scores = []
+    for offset in (np.arange(OFFSETS) + 0.5) / OFFSETS:
+        t = (np.minimum(tooth, teeth[:, None] - 1.0) + offset) * (length / teeth)[:, None]
+        points = segments[:, None, :3] + t[..., None] * segments[:, None, 3:6]
+        sigma = medium.sigma_t(points.reshape(-1, 3)).reshape(t.shape) * (tooth < teeth[:, None])
+        tilt = matched * (offset - 0.5) * rise
+        scores.append(np.exp((tilt - sigma.sum(axis=1)) * length / teeth))
+    return np.square(scores).mean(axis=0), teeth + 2.0 * matched, np.mean(scores, axis=0)
+
+
+def production_march(along: AlongRays) -> Expected:
+    """Steps at one offset, of which many are tried; what a cell of majorant 0 has is left out."""
+    step, stop = along.params["step"], along.params["stop"]
+    segments, medium = along.flight.segments, along.flight.medium
+    cells = MajorantAlongRays(along.flight.case.majorant, medium, 1.0, segments)
+    start = step * np.arange(np.ceil(segments[:, 6].max() / step))
+    width = np.clip(segments[:, 6:] - start, 0.0, step)
+    scores, lookups = [], []
+    for offset in (np.arange(OFFSETS) + 0.5) / OFFSETS:
+        points = cells.points(start + offset * width)
+        some = (cells.at(points) > 0.0) & (width > 0.0)
+        sigma = np.where(some, medium.sigma_t(points.reshape(-1, 3)).reshape(some.shape), 0.0)
+        depth = np.cumsum(sigma * width, axis=1)
+        bright = depth <= -np.log(stop)
+        scores.append(np.where(bright[:, -1], np.exp(-depth[:, -1]), 0.0))
+        # the step that makes it dark is looked up
+        lookups.append((some & np.insert(bright, 0, True, axis=1)[:, :-1]).sum(axis=1))
+    return np.square(scores).mean(axis=0), np.mean(lookups, axis=0), np.mean(scores, axis=0)
 
 
 def resampled(along: AlongRays) -> Expected:

@@ -43,7 +43,12 @@ RELATIVES: dict[str, tuple[dict[str, Any], float, Callable[..., known.Expected]]
     "collision": ({}, 1.5, known.collision),
     "decomposition_factored": ({}, 1.5, known.factored),
     "hybrid": ({"threshold": 0.3}, 1.5, known.hybrid),
+    "biased_march": ({}, 1.5, known.biased_march),
+    "biased_march-free": ({"ends": "free"}, 1.5, known.biased_march),
+    "production_march": ({"step": 0.1, "stop": 0.1}, 1, known.production_march),
 }  # fmt: skip
+IN_LAYERS = ("hybrid", "production_march")
+"""Of cells of constant extinction, of which one is empty, and so are some of the majorant."""
 
 
 def checks(catalog: Catalog) -> Iterator[Check]:
@@ -56,10 +61,13 @@ def checks(catalog: Catalog) -> Iterator[Check]:
                 yield _check(f"{tracker}/{medium}/{majorant}", tracker, axes, expected)
     for name, (parameters, tightness, known_of) in RELATIVES.items():
         tracker = name.partition("-")[0]
-        for medium in ("layered",) if tracker == "hybrid" else ("exponential", "trilinear"):
+        majorant = "grid" if tracker == "production_march" else "global"
+        cells = {"grid": {"resolution": [5, 3, 15]}} if majorant == "grid" else majorant
+        for medium in ("layered",) if tracker in IN_LAYERS else ("exponential", "trilinear"):
             axes = {"tracker": {tracker: parameters}, "medium": medium, "tightness": tightness}
+            axes |= {"lanes": 16, "majorant": cells}
             expected = partial(_relative, known_of)
-            yield _check(f"{name}/{medium}/global", tracker, axes | {"lanes": 16}, expected)
+            yield _check(f"{name}/{medium}/{majorant}", tracker, axes, expected)
 
 
 def _check(name: str, tracker: str, axes: dict[str, Any], expected: Any) -> Check:

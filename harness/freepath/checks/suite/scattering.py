@@ -265,6 +265,7 @@ for albedo, depth in itertools.product((0.3, 0.9), (0.5, 2.0, 8.0)):
     _one(f"rod/albedo-{albedo}-tau-{depth}/delta", "delta", rod, **keys)
 for sigma_t, g in itertools.product((0.1, 3.0, 30.0), (0.0, 0.7)):
     _one(f"length/tau-{sigma_t}-g-{g}/delta", "delta", length, sigma_t=sigma_t, g=g)
+_one("length/tau-3.0-g-0.7/march", "march", length, sigma_t=3.0, g=0.7)
 for kind, pairs in ((single, SHADOWS), (voxels, SHARING)):
     for (tracker, shadow), g in itertools.product(pairs, (0.0, 0.6)):
         name = f"{kind.__name__}/{shadow}-g-{g}/{tracker}"
