@@ -26,8 +26,8 @@ FURTHER = frozenset(
         *("production_march", "resampled"),
     ),
 )
-"""Trackers whose hard cases are slow, and left to `freepath check` but for what is derived of them:
-the same walks and media are met by their relatives."""
+"""Trackers of which the tests hold what is derived and no more: their walks and media are those of
+relatives. The rest is slow, for `freepath check`."""
 GROUPS = (
     *("random-numbers", "empty-full", "thin", "thick", "non-bounding", "loose", "residual"),
     *("geometry", "scale", "contrast", "accumulation", "long-runs", "scattering", "p_absorb"),
@@ -74,7 +74,7 @@ class Check:
         """
         own = {key: options.pop(key) for key in ("applies", "kernels") if key in options}
         sentence = options.pop("sentence", function.__doc__ or "")
-        if FURTHER.intersection(labels) and "hard" in labels:
+        if FURTHER.intersection(labels) and not {"moments", TINY}.intersection(labels):
             labels = ("slow", *(label for label in labels if label != "fast"))
         return cls(name, labels, " ".join(sentence.split()), partial(function, **options), **own)
 
@@ -86,9 +86,9 @@ class Check:
 
     @property
     def in_tests(self) -> bool:
-        """Whether the tests run it too: not what takes minutes, nor all of FURTHER trackers."""
-        further = FURTHER.intersection(self.labels) and "slow" in self.labels
-        return "minutes" not in self.labels and not (further and "moments" not in self.labels)
+        """Whether the tests run it too: not what takes minutes, nor what is slow of FURTHER."""
+        further = "slow" in self.labels and FURTHER.intersection(self.labels)
+        return "minutes" not in self.labels and not further
 
 
 def majorant_of(tracker: Tracker, wanted: str = "grid") -> str:

@@ -10,7 +10,7 @@ import numpy as np
 
 from freepath.checks.identities import check_count, check_mean, check_variance
 from freepath.checks.media import MAJORANTS, MEDIA
-from freepath.checks.model import Check
+from freepath.checks.model import FURTHER, Check
 from freepath.checks.rig import Flight, Rig
 from freepath.checks.suite import expectations as known
 from freepath.checks.truth import MajorantAlongRays
@@ -71,7 +71,7 @@ def checks(catalog: Catalog) -> Iterator[Check]:
 
 
 def _check(name: str, tracker: str, axes: dict[str, Any], expected: Any) -> Check:
-    speed = "fast" if "/trilinear/" in name and tracker in EXACT else "slow"
+    speed = "fast" if tracker in (EXACT if "/trilinear/" in name else FURTHER) else "slow"
     kernels = f"{tracker}/transmittance/{name.partition('/')[2]}"
     options = {"kernels": kernels, "axes": axes, "expected": expected}
     return Check.of(f"moments/{name}", (speed, "moments", tracker), as_derived, **options)
