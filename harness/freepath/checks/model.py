@@ -20,12 +20,10 @@ what else is selected nor on which trackers were added."""
 LEVEL = sidak(BUDGET, MOST_CHECKS)
 
 TINY = "tiny"
-FURTHER = frozenset(
-    (
-        *("biased_march", "collision", "decomposition_factored", "hybrid", "jackknife"),
-        *("production_march", "resampled"),
-    ),
-)
+FURTHER = frozenset((
+    *("biased_march", "collision", "decomposition_factored", "hybrid"),
+    *("jackknife", "jackknife_placed", "production_march", "resampled"),
+))  # fmt: skip
 """Trackers of which the tests hold what is derived and no more: their walks and media are those of
 relatives. The rest is slow, for `freepath check`."""
 GROUPS = (

@@ -73,11 +73,11 @@ class MajorantAlongRays:
         """The places at distances t (rays, samples)."""
         return self._segments[:, None, :3] + t[..., None] * self._segments[:, None, 3:6]
 
-    def at(self, points: Array) -> Array:
-        """The majorant there."""
+    def at(self, points: Array, values: Array | None = None) -> Array:
+        """The majorant there, or other values of its cells."""
         share = points / self._medium.extent * self._cells
         i, j, k = np.moveaxis(np.clip(share.astype(int), 0, self._cells - 1), -1, 0)
-        return self._upper[k, j, i]
+        return (self._upper if values is None else values)[k, j, i]
 
     def tentative_collisions(self) -> Array:
         """The integral of the majorant: of a path that none of them stops."""

@@ -128,6 +128,32 @@ def jackknife(along: AlongRays) -> Expected:
     return second, lookups, np.abs(march(0.5 + 0.5j)) ** 2
 
 
+def jackknife_placed(along: AlongRays) -> Expected:
+    """The same of intervals that are equal in the depth of the density of lookups."""
+    flight, steps = along.flight, int(along.params["steps"])
+    model, segments = flight.case.majorant, flight.segments
+    cells = MajorantAlongRays(model, flight.medium, 1.0, segments)
+    bounds = flight.medium.bounds(majorants.cells_of(model))
+    built = majorants.build(model, flight.medium, bounds, 1.0, along.params).data
+    t = (np.arange(POINTS) + 0.5) * along.step
+    density, control = (cells.at(cells.points(t), b[1:-1, 1:-1, 1:-1]) for b in built)
+    depth = np.insert(np.cumsum(density * along.step, axis=1), 0, 0.0, axis=1)
+    share = depth[:, -1:] / steps
+    counted = (along.sigma - control) / np.where(density > 0.0, density, 1.0) * share
+
+    def march(k: complex) -> Any:
+        inside = np.cumsum(np.exp(-k * counted) * density * along.step, axis=1)
+        inside = np.insert(inside, 0, 0.0, axis=1)
+        means = [
+            np.diff(np.interp(np.arange(steps + 1) * s, d, ins)) / s if s > 0.0 else np.ones(steps)
+            for s, d, ins in zip(share[:, 0], depth, inside, strict=True)
+        ]
+        return np.prod(means, axis=1) * np.exp(-k * along.integral(control))
+
+    second = (march(1.0) ** 2 + np.abs(march(1.0 + 1.0j)) ** 2) / 2.0
+    return second, np.full(len(t), 2.0 * steps), np.abs(march(0.5 + 0.5j)) ** 2
+
+
 def biased_march(along: AlongRays) -> Expected:
     """One comb of equal steps, at many offsets; `matched` has a lookup at both ends too."""
     medium, segments, length = (

@@ -39,6 +39,8 @@ RELATIVES: dict[str, tuple[dict[str, Any], float, Callable[..., known.Expected]]
     "next_flight_ratio": ({}, 1.5, known.cost_of(known.ratio)),
     "track_length": ({}, 1.5, known.track_length_cost),
     "jackknife": ({}, 1, known.jackknife),
+    "jackknife_placed": ({}, 1, known.jackknife_placed),
+    "jackknife_placed-mean": ({"placement": "mean"}, 1, known.jackknife_placed),
     "resampled": ({"scatter": 0.3}, 1.5, known.resampled),
     "collision": ({}, 1.5, known.collision),
     "decomposition_factored": ({}, 1.5, known.factored),
@@ -47,6 +49,7 @@ RELATIVES: dict[str, tuple[dict[str, Any], float, Callable[..., known.Expected]]
     "biased_march-free": ({"ends": "free"}, 1.5, known.biased_march),
     "production_march": ({"step": 0.1, "stop": 0.1}, 1, known.production_march),
 }  # fmt: skip
+BY_CELLS = ("jackknife_placed", "production_march")
 IN_LAYERS = ("hybrid", "production_march")
 """Of cells of constant extinction, of which one is empty, and so are some of the majorant."""
 
@@ -61,7 +64,7 @@ def checks(catalog: Catalog) -> Iterator[Check]:
                 yield _check(f"{tracker}/{medium}/{majorant}", tracker, axes, expected)
     for name, (parameters, tightness, known_of) in RELATIVES.items():
         tracker = name.partition("-")[0]
-        majorant = "grid" if tracker == "production_march" else "global"
+        majorant = "grid" if tracker in BY_CELLS else "global"
         cells = {"grid": {"resolution": [5, 3, 15]}} if majorant == "grid" else majorant
         for medium in ("layered",) if tracker in IN_LAYERS else ("exponential", "trilinear"):
             axes = {"tracker": {tracker: parameters}, "medium": medium, "tightness": tightness}
