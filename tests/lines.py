@@ -12,9 +12,9 @@ PACKAGE = ROOT / "harness" / "freepath"
 BUDGET = {
     "checks": 4795,
     "kernels": 3594,
-    "scene": 3000,
+    "scene": 3024,
     "show": 3150,
-    "measure": 2625,
+    "measure": 2627,
     "config": 2108,
     "commands": 1700,
     "device": 1400,
