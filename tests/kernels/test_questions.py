@@ -15,14 +15,14 @@ ERROR = 0.01
 # (question, a case of it, another that needs more lookups; parts of their names)
 ANSWERS = [
     ("null_scattering_or_marching", "t1/biased_march", "t1/ratio"),
-    ("null_scattering_or_marching_paths", "grid-8/t1/delta", "t1/production_march"),
+    ("null_or_marching_paths", "grid-8/t1/delta", "t1/production_march"),
     ("how_loose_may_a_majorant_be", "t1/delta", "t4/delta"),
     ("how_fine_a_majorant_grid", "grid-16/t1/ratio", "grid-4/t1/ratio"),
     ("are_minorants_worth_it", "linear.*decomposition", "linear.*/delta"),
     ("may_a_majorant_not_bound", "t0.5/delta", "t1/delta"),
-    ("delta_or_cells_beside_an_absorber", "hybrid", "t1/delta"),
-    ("when_does_a_chosen_chance_to_scatter_pay", "0.01.*resampled-", "0.01.*analytic/delta"),
-    ("when_does_a_chosen_chance_to_scatter_pay", "us-4-.*analytic/delta", "us-4-.*resampled-"),
+    ("delta_or_cells", "hybrid", "t1/delta"),
+    ("when_to_choose_scattering", "0.01.*resampled-", "0.01.*analytic/delta"),
+    ("when_to_choose_scattering", "us-4-.*analytic/delta", "us-4-.*resampled-"),
 ]
 
 
