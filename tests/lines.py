@@ -10,12 +10,12 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "harness" / "freepath"
 BUDGET = {
-    "checks": 4795,
+    "checks": 4794,
     "kernels": 3594,
     "scene": 3024,
     "show": 3150,
     "measure": 2627,
-    "config": 2108,
+    "config": 2103,
     "commands": 1700,
     "device": 1400,
     "compose": 1000,
