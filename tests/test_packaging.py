@@ -136,7 +136,7 @@ def test_the_wheel_needs_nothing_beside_it(wheel, tmp_path):
     )
     ended = python(code, empty)
     main = (ROOT / "kernels" / "main.cl").read_text("utf-8")
-    counts = len(list((ROOT / "configs").glob("*.yaml"))), len(catalog.load().trackers)
+    counts = len(list((ROOT / "configs").rglob("*.yaml"))), len(catalog.load().trackers)
     assert ended == f"{site / 'freepath'} {counts[0]} {counts[1]}\n{len(main)}\n"
 
 

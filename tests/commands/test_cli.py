@@ -225,6 +225,9 @@ def test_lists(call, what):
     assert records
     for record in records:
         assert next(iter(record.values())) in out
+    short = [line.split()[0] for line in call("list", what, "--short")[1].splitlines()]
+    assert set(short) >= {next(iter(record.values())) for record in records}
+    assert len(short) == len(records) or what == "configs"  # whose descriptions are long
 
 
 def test_what_is_told_of_a_medium(call):

@@ -109,7 +109,9 @@ def test_every_kind_loads_and_loads_again_from_what_it_holds(load_text, small_ca
         "emission": (0.0,),
         "phase": "henyey_greenstein",
         "g": 0.0,
+        "alpha": 1.0,
     }
+    assert "alpha" not in media[0].as_dict()["homogeneous"]  # or ids of cases would be others
     assert media[7].breakpoints == (0.5,)
     assert media[10].voxel_size == (20.0, 20.0, 40.0)
     assert media[5].amplitude == 0.5
@@ -218,6 +220,12 @@ BAD_MATRIX = [
         "expected a medium as a single key, got 2 keys; indent 'resolution' deeper than 'cloud'",
     ),
     ("medium: {cloud: 1, volume: 2}", 4, 11, "matrix.medium: expected a medium as a single key"),
+    (
+        "medium: {homogeneous: {sigma_t: 1, phase: rayleigh, g: 0.5}}",
+        4,
+        58,
+        "matrix.medium.g: expected no g with phase: rayleigh, got 0.5",
+    ),
     (
         "medium: {cloud: {resolution: 8, channels: [1]}}",
         4,

@@ -52,7 +52,7 @@ def test_every_short_form_is_accepted(validator):
 
 
 # what JSON Schema cannot say: dimensions of units, order, sums, and that a number is finite
-BEYOND_SCHEMA = ("1 s}", "5 m}", "layered", ".nan", "1e999", "resolution: 1000}")
+BEYOND_SCHEMA = ("1 s}", "5 m}", "layered", ".nan", "1e999", "resolution: 1000}", "rayleigh")
 
 
 @pytest.mark.parametrize("lines", [lines for lines, *_ in BAD_MATRIX])

@@ -176,7 +176,7 @@ def test_a_majorant_that_does_not_fit_is_refused(work, selector):
 
 
 @pytest.mark.parametrize("kind", ["grid", "octree"])
-@pytest.mark.parametrize("control", [None, "middle", "mean"])
+@pytest.mark.parametrize("control", [None, "middle", "mean", "placement"])
 @pytest.mark.parametrize("shape", [(2, 3, 2**10), (32, 64, 32)])
 def test_what_a_majorant_takes_is_told_beforehand(kind, control, shape):
     """At least what is seen while it is made and its copy, and not more than three times that."""
@@ -186,6 +186,7 @@ def test_what_a_majorant_takes_is_told_beforehand(kind, control, shape):
     cells = majorants.cells_of(model)[::-1]
     bounds = np.ones(cells), np.full(cells, 2.0)
     asked = {"control": control, "share": 1.0} if control else None
+    asked = {"placement": "second_moment"} if control == "placement" else asked
     tracemalloc.start()
     before = tracemalloc.get_traced_memory()[0]
     made = majorants.build(model, medium, bounds, 2.0, asked)

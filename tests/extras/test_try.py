@@ -260,7 +260,7 @@ def test_a_new_tracker_begins_as_its_parent(work, capsys):
     assert tracker.code.splitlines()[16:] == known.trackers["march"].code.splitlines()[15:]
     for words, told in (
         (["mine", "--like", "march"], "mine.cl: is there already"),
-        (["other", "--like", "marsh"], "--like marsh: expected one of analytic, combined"),
+        (["other", "--like", "marsh"], "--like marsh: expected one of analytic, biased_march"),
         (["ratio", "--like", "march"], "expected a new name of letters"),
         (["a-b", "--like", "march"], "expected a new name of letters"),
     ):

@@ -137,6 +137,18 @@ def test_equal_to_its_relative_sample_for_sample(rig, tracker, relative):
     np.testing.assert_allclose(one.score[same], other.score[same], rtol=1e-4, atol=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("threshold", "relative", "estimand"),
+    [(0, "delta", "transmittance"), (2, "regular", "transmittance"), (2, "regular", "free_path")],
+)
+def test_hybrid_is_delta_or_regular(rig, threshold, relative, estimand):
+    axes = {"medium": "layered", "estimand": estimand, "lanes": 16, "majorant": "global"}
+    one = rig.flight(tracker={"hybrid": {"threshold": threshold}}, **axes).record(256)
+    other = rig.flight(tracker=relative, **axes).record(256)
+    assert (one.lookups == other.lookups).mean() > 1 - 1e-5
+    np.testing.assert_allclose(one.score, other.score, rtol=1e-4, atol=1e-6)
+
+
 @pytest.mark.parametrize("majorant", ["grid", {"octree": {"resolution": 8}}])
 @pytest.mark.parametrize("tracker", ["delta", "residual_ratio", "weighted_decomposition"])
 def test_local_majorants_and_controls_keep_the_mean(rig, tracker, majorant):

@@ -12,7 +12,7 @@ from freepath.scene.special import NODES, WEIGHTS
 MEDIUM = {"gaussian": {"sigma_t": 3.0, "width": 0.4, "center": [0.4, 0.6, 0.3]}}
 RAYS = {"chords": {"count": 64}}
 STEPS = np.array([1 / 8, 1 / 16, 1 / 32, 1 / 64])
-ALPHA = sidak(1e-3, 12)
+ALPHA = sidak(1e-3, 16)
 
 
 def marched(rig, estimand, placement, step, **options):
@@ -49,11 +49,18 @@ def marched_transmittance(flight, step, placement):
             for node, weight in zip(NODES, WEIGHTS, strict=True)
         )
         return factors.prod(axis=1)
+    if placement == "comb":
+        depths = [
+            (length * extinction(flight, start + node * length)).sum(axis=1) for node in NODES
+        ]
+        return sum(w * np.exp(-depth) for w, depth in zip(WEIGHTS, depths, strict=True))
     share = {"start": 0.0, "midpoint": 0.5}[placement]
     return np.exp(-(length * extinction(flight, start + share * length)).sum(axis=1))
 
 
-@pytest.mark.parametrize(("placement", "order"), [("start", 1), ("midpoint", 2), ("jittered", 3)])
+@pytest.mark.parametrize(
+    ("placement", "order"), [("start", 1), ("midpoint", 2), ("jittered", 3), ("comb", 2)]
+)
 def test_transmittance(rig, placement, order):
     """Each step size gives what it should to the last digits, and that converges at the order.
 
@@ -64,7 +71,7 @@ def test_transmittance(rig, placement, order):
     for step in STEPS:
         flight = marched(rig, "transmittance", placement, step)
         expected = marched_transmittance(flight, step, placement)
-        if placement == "jittered":
+        if placement in ("jittered", "comb"):
             check_mean(flight.run(2000).moments, expected, ALPHA)
         else:
             found = flight.run(2).moments

@@ -134,6 +134,7 @@ def test_errors(base):
     assert row["rmse"] ** 2 == pytest.approx(row["variance"])
     assert row["inv_efficiency_lookups"] == pytest.approx(5 * row["variance"])
     assert row["inv_efficiency_s"] == pytest.approx(2e-6 * row["variance"])
+    assert row["figure_of_merit"] == pytest.approx(0.5**2 / (2e-6 * row["variance"]))
     assert row["time_to_1pct_s"] == pytest.approx(2e-6 * row["variance"] / 0.005**2)
     assert row["time_to_10pct_s"] == pytest.approx(2e-6 * max(1, row["variance"] / 0.05**2))
     assert row["time_to_0.1pct_s"] == pytest.approx(100 * row["time_to_1pct_s"])

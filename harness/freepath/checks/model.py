@@ -20,6 +20,12 @@ what else is selected nor on which trackers were added."""
 LEVEL = sidak(BUDGET, MOST_CHECKS)
 
 TINY = "tiny"
+FURTHER = frozenset((
+    *("biased_march", "collision", "decomposition_factored", "hybrid"),
+    *("jackknife", "jackknife_placed", "production_march", "resampled"),
+))  # fmt: skip
+"""Trackers of which the tests hold what is derived and no more: their walks and media are those of
+relatives. The rest is slow, for `freepath check`."""
 GROUPS = (
     *("random-numbers", "empty-full", "thin", "thick", "non-bounding", "loose", "residual"),
     *("geometry", "scale", "contrast", "accumulation", "long-runs", "scattering", "p_absorb"),
@@ -66,6 +72,8 @@ class Check:
         """
         own = {key: options.pop(key) for key in ("applies", "kernels") if key in options}
         sentence = options.pop("sentence", function.__doc__ or "")
+        if FURTHER.intersection(labels) and not {"moments", TINY}.intersection(labels):
+            labels = ("slow", *(label for label in labels if label != "fast"))
         return cls(name, labels, " ".join(sentence.split()), partial(function, **options), **own)
 
     def reason_against(self, info: DeviceInfo) -> str:
@@ -76,8 +84,9 @@ class Check:
 
     @property
     def in_tests(self) -> bool:
-        """Whether the tests run it too: all but those that take minutes."""
-        return "minutes" not in self.labels
+        """Whether the tests run it too: not what takes minutes, nor what is slow of FURTHER."""
+        further = "slow" in self.labels and FURTHER.intersection(self.labels)
+        return "minutes" not in self.labels and not further
 
 
 def majorant_of(tracker: Tracker, wanted: str = "grid") -> str:

@@ -22,6 +22,7 @@ def add(commands: Any) -> None:
     command.add_argument(
         "what", nargs="?", choices=LISTS, default=LISTS[0], help="trackers if none"
     )
+    command.add_argument("--short", action="store_true", help="a line each")
     command.add_argument("--json", action="store_true", help="as JSON")
     add_trackers(command)
 
@@ -32,4 +33,6 @@ def execute(options: Namespace) -> int:
     from freepath.show import listing
 
     records = listing.records_of(options.what, catalog.load(options.trackers))
+    if options.short:
+        records = [dict(list(record.items())[:2]) for record in records]
     return print_records(records, as_json=options.json)

@@ -57,6 +57,8 @@ class Parameter(Model):
     meaning: Annotated[str, Text()] | None = None
     host: Annotated[bool, Flag()] = False
     """Read by the host alone, when it makes majorants and controls; kernels do not see it."""
+    later: Annotated[bool, Flag()] = False
+    """Whether the tracker had no such parameter at first: ids of cases stay where it is usual."""
     default: Any
 
     @field_validator("choices", mode="after")
@@ -274,4 +276,5 @@ def _parameter_model(name: str, front: FrontMatter) -> type[Kind]:
     }
     model = create_model(name, __base__=Kind, __doc__=front.title, **fields)
     model.kind, model.NEEDS = name, frozenset(front.needs)
+    model.LATER = frozenset(key for key, given in front.parameters.items() if given.later)
     return model

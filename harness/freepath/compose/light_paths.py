@@ -77,6 +77,11 @@ class Effects:
         return state | {f"held_{name}": kind for name, (kind, _) in self._held.items()}
 
     @property
+    def uses(self) -> tuple[str, ...]:
+        """What its phase function has composed before it."""
+        return kernel_files.read(f"light/phase_{self.phase}").uses if "scattering" in self else ()
+
+    @property
     def _held(self) -> dict[str, tuple[str, str]]:
         """The kind and the place of what a lane keeps of its path while it flies a shadow ray."""
         channels = kernel_files.read(
@@ -269,7 +274,9 @@ def _values(
     if "scattering" in names:
         unlimited = case.scatterings == UNLIMITED
         optics["scatterings"] = MOST_SCATTERINGS if unlimited else case.scatterings
-        optics["g"] = model.g
+        optics |= (
+            {"g": model.g, "alpha": model.alpha} if model.phase == "draine" else {"g": model.g}
+        )
     if "p_absorb" in names:
         optics["p_absorb"] = chance_of_absorption(case)
     if "scattering" in names or "environment_image" in names:

@@ -85,6 +85,7 @@ def compose(structure: Structure) -> Source:
     parts = [_defines(structure)]
     parts += _named(kernel_files.read(name) for name in _before_structs(structure))
     uses = [name for tracker in structure.trackers for name in tracker.uses]
+    uses += structure.paths.uses if structure.paths else ()
     walks = _with_uses([*_walks(structure), *uses])
     channels = kernel_files.read(f"score/channels_{'several' if structure.chromatic else 'one'}")
     parts.append(_structs(structure, [*walks, channels]))

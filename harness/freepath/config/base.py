@@ -94,13 +94,17 @@ class Kind(Model):
     kind: ClassVar[str] = ""
     NEEDS: ClassVar[frozenset[str]] = frozenset()
     """What a tracker takes beside the extinction at a point; of other kinds nothing."""
+    LATER: ClassVar[frozenset[str]] = frozenset()
+    """Parameters that ids of cases that people have do not know: left out where they are usual."""
 
     @model_serializer(mode="wrap")
     def _as_written(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        return {self.kind: handler(self)}
+        fields = type(self).model_fields
+        usual = {name for name in self.LATER if getattr(self, name) == fields[name].default}
+        return {self.kind: {n: value for n, value in handler(self).items() if n not in usual}}
 
     def as_dict(self) -> dict[str, Any]:
-        """Return {kind: {parameter: value}} with every default filled in, fit for JSON."""
+        """Return {kind: {parameter: value}}, defaults filled in but those of LATER, for JSON."""
         return self.model_dump(mode="json")
 
     def parameters(self) -> dict[str, Any]:

@@ -84,8 +84,7 @@ def _unreadable(path: Path | str, message: str) -> ConfigError:
 def shipped(package_configs: Any = None) -> dict[str, Path]:
     """Return the configs that come with freepath, by name."""
     folder = package_configs or CONFIGS
-    files = [Path(str(item)) for item in folder.iterdir() if item.name.endswith(".yaml")]
-    return {file.stem: file for file in sorted(files)}
+    return {file.stem: file for file in sorted(Path(str(folder)).rglob("*.yaml"))}
 
 
 def find(name: Path | str, package_configs: Any = None) -> Path:

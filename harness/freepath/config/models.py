@@ -14,7 +14,9 @@ LARGEST_GRID = 1024
 MOST_CELLS = 2**27
 LARGEST_IMAGE = 4096
 MOST_CHANNELS = 32
-PHASES = ("henyey_greenstein", "rod")
+PHASES = {"henyey_greenstein": "g", "rod": "", "rayleigh": "", "cornette_shanks": "g"}
+PHASES |= {"draine": "g alpha"}
+"""Each with its parameters."""
 RAW = r"([1-9]\d{0,9}x){2}[1-9]\d{0,9} (u?int8|(u?int(16|32|64)|float(16|32|64)) (little|big))"
 RAW_EXPECTED = "voxels along x, y, z, a type and a byte order, such as '256x256x64 uint16 little'"
 
@@ -74,6 +76,7 @@ class Medium(Kind):
     """A medium; OFFERS says what a tracker may ask of it beside sigma_t at a point."""
 
     OFFERS: ClassVar[frozenset[str]] = frozenset()
+    LATER: ClassVar[frozenset[str]] = frozenset({"alpha"})
     VOXELS: ClassVar[bool] = False
     """Whether its extinction is stored voxel by voxel."""
     channels: Annotated[tuple[Factor, ...], Several(2, MOST_CHANNELS)] | None = None
@@ -82,10 +85,12 @@ class Medium(Kind):
     """Share of the extinction that scatters, of radiance; one number, or one a channel."""
     emission: Annotated[tuple[Factor, ...], OneOrMore()] = (0.0,)
     """Radiance of the source where the medium absorbs; one number, or one a channel."""
-    phase: Annotated[str, Choice(PHASES)] = "henyey_greenstein"
+    phase: Annotated[str, Choice(tuple(PHASES))] = "henyey_greenstein"
     """Where it scatters to; rod is forward or backward along the ray."""
     g: Annotated[float, Number("fraction", above=-1, below=1)] = 0.0
-    """Mean cosine of the angle of scattering, of henyey_greenstein; 0 is isotropic."""
+    """Mean cosine of henyey_greenstein, 0 is isotropic; of cornette_shanks and draine its share."""
+    alpha: Annotated[float, Number(minimum=0, maximum=1000)] = 1.0
+    """Weight of the squared cosine, of draine: 0 is henyey_greenstein, 1 cornette_shanks."""
 
     @field_validator("albedo", "emission", mode="after")
     @classmethod
@@ -94,6 +99,14 @@ class Medium(Kind):
         if len(values) not in (1, channels):
             raise failure(f"expected {_counted(channels)}, got {len(values)}")
         return values
+
+    @field_validator("g", "alpha", mode="after")
+    @classmethod
+    def _of_its_phase(cls, value: float, info: ValidationInfo) -> float:
+        phase = info.data.get("phase", "draine")
+        if value and info.field_name not in PHASES[phase].split():
+            raise failure(f"expected no {info.field_name} with phase: {phase}, got {value:g}")
+        return value
 
     @property
     def channel_count(self) -> int:

@@ -135,8 +135,14 @@ def _errors(result: Accuracy, found: Measurement, row: dict[str, Any]) -> dict[s
         "rmse": result.rmse,
         "inv_efficiency_lookups": result.variance * row["lookups_per_sample"],
         "inv_efficiency_s": result.variance * seconds,
+        "figure_of_merit": _merit(result, seconds),
         **{name: result.time_to(error, seconds) for name, error in LADDER.items()},
     }
+
+
+def _merit(result: Accuracy, seconds: float) -> float | None:
+    mean = result.estimate if result.reference is None else result.reference
+    return mean**2 / (result.variance * seconds) if result.variance > 0.0 else None
 
 
 def verdict(

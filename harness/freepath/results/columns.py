@@ -101,6 +101,8 @@ variance_noise float - half its 95 % interval over rounds, relative; empty where
 rmse float - of one sample: rmse^2 = variance + bias_rms^2
 inv_efficiency_lookups float - variance x lookups per sample: lower is better
 inv_efficiency_s float s variance x seconds per sample: lower is better
+figure_of_merit float 1/s that of reactor physics, 1 / (relative variance x seconds per sample):
+    higher is better, biases are left out; empty where nothing varies
 time_to_10pct_s float s device seconds per ray until the RMSE is 10 % of the reference; `inf` where
     the bias alone is more, empty where the variance is unknown
 time_to_1pct_s float s the same for 1 %

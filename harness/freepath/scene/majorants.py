@@ -27,6 +27,8 @@ class Majorant:
     """How far the control lies above the extinction at most, relative to the highest extinction."""
 
 
+LEAST = 0.01
+"""Of a cell's range, the least density of lookups: points may miss what a cell has."""
 EXCESS = 1e-6
 """How far above the extinction a control may be by rounding, relative to the majorant."""
 
@@ -66,8 +68,9 @@ def bytes_of(model: Any, control: Any) -> int:
     twice and two more in the making; means are taken over the points of a layer of cells.
     """
     octree, controlled, (nx, ny, _) = model.kind == "octree", control is not None, cells_of(model)
-    layer = nx * ny * POINTS**3 * 64 if control == "mean" else 0
+    layer = nx * ny * POINTS**3 * 64 if control in ("mean", "placement") else 0
     per_cell, arrays = 32 + 48 * controlled + 32 * octree, 1 + controlled + octree
+    per_cell += 40 * (control == "placement")  # the squares, and what is made of them
     stored = math.prod(_stored(model)) * 8 * (arrays + 1)
     return math.prod(cells_of(model)) * per_cell + stored + layer
 
@@ -95,11 +98,13 @@ def build(
     (a tracker's parameters `control` and `share`) the extinction less the control is bounded
     instead: |sigma_t - control| in each cell, times tightness.
     """
-    cells = _joined(
-        model, medium, bounds, with_means=bool(control) and control["control"] == "mean"
-    )
+    placed = bool(control) and "placement" in control
+    with_means = placed or (bool(control) and control["control"] == "mean")
+    cells = _joined(model, medium, bounds, with_means=with_means)
     if control is None:
         return _packed(model, medium, [cells.upper * tightness, cells.sizes, None])
+    if placed:
+        return _packed(model, medium, _placement(model, medium, cells, control["placement"]))
     controls = _controls(cells, control)
     residual = np.maximum(cells.upper - controls, controls - cells.lower) * tightness
     excess = float((controls - cells.lower).max() / max(cells.upper.max(), np.finfo(float).tiny))
@@ -143,6 +148,21 @@ def _joined(
     return Cells(lower, upper, means, sizes)
 
 
+def _placement(model: Any, medium: Medium, cells: Cells, by: str) -> list[np.ndarray | None]:
+    """How densely each cell is looked up, at least by LEAST of its range, with sizes and controls.
+
+    By its mean; or by the root of the second moment of what is above its minorant, the control.
+    """
+    lower, upper, means = cells.lower, cells.upper, cells.means
+    if by == "mean":
+        return [np.maximum(means, LEAST * upper), cells.sizes, np.zeros_like(lower)]
+    squares = _means(medium, cells_of(model), lower, upper, power=2)
+    if cells.sizes is not None:
+        squares = over_leaves(squares, cells.sizes, np.mean)
+    above = np.sqrt(np.maximum(squares - 2.0 * lower * means + lower**2, 0.0))
+    return [np.maximum(above, LEAST * (upper - lower)), cells.sizes, lower]
+
+
 def _controls(bounds: Cells, control: Mapping[str, Any]) -> np.ndarray:
     base = {
         "minorant": bounds.lower,
@@ -153,9 +173,12 @@ def _controls(bounds: Cells, control: Mapping[str, Any]) -> np.ndarray:
     return base * control["share"]
 
 
-def _means(medium: Medium, cells: tuple, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
-    """The mean extinction of each cell [nz, ny, nx], from points; of the whole box exactly."""
-    if cells == (1, 1, 1):
+def _means(
+    medium: Medium, cells: tuple, lower: np.ndarray, upper: np.ndarray, power: int = 1
+) -> np.ndarray:
+    """The mean of a power of the extinction in each cell [nz, ny, nx], from points; of the whole
+    box exactly."""
+    if cells == (1, 1, 1) and power == 1:
         return np.full((1, 1, 1), medium.mean())
     axes = [
         (np.arange(n * POINTS) + 0.5) * (extent / (n * POINTS))
@@ -167,5 +190,5 @@ def _means(medium: Medium, cells: tuple, lower: np.ndarray, upper: np.ndarray) -
         z, y, x = np.meshgrid(heights, axes[1], axes[0], indexing="ij")
         values = medium.sigma_t(np.stack([x.ravel(), y.ravel(), z.ravel()], axis=1))
         shape = (POINTS, cells[1], POINTS, cells[0], POINTS)
-        means[layer] = values.reshape(shape).mean(axis=(0, 2, 4))
-    return np.clip(means, lower, upper)
+        means[layer] = (values**power).reshape(shape).mean(axis=(0, 2, 4))
+    return np.clip(means, lower**power, upper**power)

@@ -26,7 +26,7 @@ EFFECTS = {
     "emission": "the medium emits: collected where a path is absorbed",
     "environment": "light from outside: collected where a path leaves",
     "environment_image": "light from outside as an image has it: looked up where a path leaves",
-    "scattering": "a path goes on in a new direction; phase: isotropic, Henyey-Greenstein or rod",
+    "scattering": "a path goes on in a new direction, as the medium's phase says",
     "roulette": "scatterings without limit: a path of little weight may end",
     "p_absorb": "a path is absorbed at a collision with a chosen chance, and weighted for it",
     "point_light": "a shadow ray at each scattering, with a tracker of its own",

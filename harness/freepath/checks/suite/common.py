@@ -92,8 +92,8 @@ def walks(tracker: Tracker) -> bool:
 
 
 def splits_off(tracker: Tracker) -> bool:
-    """Trackers that use a control."""
-    return "control" in tracker.needs
+    """Trackers that use a control of one's choice."""
+    return "control" in tracker.parameters
 
 
 def knows_depth(tracker: Tracker) -> bool:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from freepath.checks.cases import check_samples
@@ -67,9 +69,14 @@ def one_voxel(rig: Rig, alpha: float, tracker: Tracker) -> None:
     directions = unit(offsets[0])
     starts = [centre - 2.0 * directions, centre - 2.0 * directions + 0.2 * unit(offsets[1])]
     lines = np.concatenate(starts), np.tile(directions, (2, 1))
-    marching = {"step": 0.25 / ONE_IN} if "step" in tracker.parameters else {}
+    fine = {"step": 0.25 / ONE_IN, "steps": ONE_IN}
+    axes: dict[str, Any] = {
+        "parameters": {n: v for n, v in fine.items() if n in tracker.parameters}
+    }
+    # as many teeth as that many mean free paths of the majorant
+    axes |= {"parameters": {}} if tracker.unbiased else {"tightness": 64}
     medium = rig.volume(values, voxel_size=1 / ONE_IN)
-    flight = fly(rig, tracker, medium, lines=lines, parameters=marching)
+    flight = fly(rig, tracker, medium, lines=lines, **axes)
     samples = flight.record(1024)
     check_samples(flight, samples, alpha)
     moments = samples.round.moments

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,11 +13,14 @@ from freepath.scene import majorants
 from freepath.scene.media.base import crossings, partition
 
 Array = NDArray[np.float64]
-Expected = tuple[Array | None, Array]
-"""The mean of the squared score, where it has a formula, and of the lookups: of each ray."""
+Expected = tuple[Array | None, Array] | tuple[Array | None, Array, Array]
+"""The mean of the squared score, where it has a formula, and of the lookups: of each ray. Of a
+biased estimator, the mean of its score too."""
 
 POINTS = 2048
 """Of the midpoint rule along a ray: its error is far below that of the samples."""
+OFFSETS = 256
+"""Of a comb of steps, that are averaged over."""
 
 
 class AlongRays:
@@ -26,10 +30,11 @@ class AlongRays:
         self.flight, segments = flight, flight.segments
         self.step = segments[:, 6:] / POINTS
         t = (np.arange(POINTS) + 0.5) * self.step
-        points = segments[:, None, :3] + t[..., None] * segments[:, None, 3:6]
+        points = self.points(t)
         self.sigma = flight.medium.sigma_t(points.reshape(-1, 3)).reshape(t.shape)
         case = flight.case
-        control = case.params if "control" in flight.tracker.needs else None
+        self.params = case.params
+        control = case.params if "control" in case.params else None
         self._model, self._cells = case.majorant, np.array((1, 1, 1))
         if case.majorant is None:
             return
@@ -40,6 +45,15 @@ class AlongRays:
         self.majorant = self._value(0, cell) + np.zeros_like(t)
         last = 2 if case.majorant.kind == "octree" else 1
         self.control = self._value(last, cell) if control else 0.0
+
+    def points(self, t: Array) -> Array:
+        """The places at distances t (rays, samples)."""
+        segments = self.flight.segments
+        return segments[:, None, :3] + t[..., None] * segments[:, None, 3:6]
+
+    def majorant_at(self, points: Array) -> Array | float:
+        """The majorant of the cells that they are in."""
+        return self._value(0, self._cell(points))
 
     def _cell(self, points: Array) -> NDArray[np.intp]:
         where = points / self.flight.medium.extent * self._cells
@@ -150,3 +164,125 @@ def track_length_cost(along: AlongRays) -> Expected:
 def cost_of(known: Callable[[AlongRays], Expected]) -> Callable[[AlongRays], Expected]:
     """Lookups as those of another; no formula of the variance."""
     return lambda along: (None, known(along)[1])
+
+
+def jackknife(along: AlongRays) -> Expected:
+    """Two marches: products over their intervals, each of a mean."""
+    steps = int(along.params["steps"])
+    pieces = along.sigma * along.step * (POINTS // steps)
+    pieces = pieces.reshape(len(pieces), steps, -1)
+
+    def march(k: complex) -> Any:
+        return np.exp(-k * pieces).mean(axis=2).prod(axis=1)
+
+    second = (march(1.0) ** 2 + np.abs(march(1.0 + 1.0j)) ** 2) / 2.0
+    lookups = np.full(len(pieces), 2.0 * steps)
+    return second, lookups, np.abs(march(0.5 + 0.5j)) ** 2
+
+
+def jackknife_placed(along: AlongRays) -> Expected:
+    """The same of intervals that are equal in the depth of the density of lookups."""
+    steps, density, control = int(along.params["steps"]), along.majorant, along.control
+    depth = np.insert(np.cumsum(density * along.step, axis=1), 0, 0.0, axis=1)
+    share = depth[:, -1:] / steps
+    counted = (along.sigma - control) / np.where(density > 0.0, density, 1.0) * share
+
+    def march(k: complex) -> Any:
+        inside = np.cumsum(np.exp(-k * counted) * density * along.step, axis=1)
+        inside = np.insert(inside, 0, 0.0, axis=1)
+        means = [
+            np.diff(np.interp(np.arange(steps + 1) * s, d, ins)) / s if s > 0.0 else np.ones(steps)
+            for s, d, ins in zip(share[:, 0], depth, inside, strict=True)
+        ]
+        return np.prod(means, axis=1) * np.exp(-k * along.integral(control))
+
+    second = (march(1.0) ** 2 + np.abs(march(1.0 + 1.0j)) ** 2) / 2.0
+    return second, np.full(len(depth), 2.0 * steps), np.abs(march(0.5 + 0.5j)) ** 2
+
+
+def biased_march(along: AlongRays) -> Expected:
+    """One comb of equal steps, at many offsets; `matched` has a lookup at both ends too."""
+    medium, segments, length = (
+        along.flight.medium,
+        along.flight.segments,
+        along.flight.segments[:, 6],
+    )
+    whole = along.majorant[:, 0] * length
+    teeth = np.ceil(np.cbrt((0.015 + whole) * (0.65 + whole) * (60.3 + whole)))
+    matched = along.params["ends"] == "matched"
+    start, way = segments[:, :3], length[:, None] * segments[:, 3:6]
+    rise = medium.sigma_t(start + way) - medium.sigma_t(start)
+    tooth = np.arange(teeth.max())
+    scores = []
+    for offset in (np.arange(OFFSETS) + 0.5) / OFFSETS:
+        t = (np.minimum(tooth, teeth[:, None] - 1.0) + offset) * (length / teeth)[:, None]
+        points = segments[:, None, :3] + t[..., None] * segments[:, None, 3:6]
+        sigma = medium.sigma_t(points.reshape(-1, 3)).reshape(t.shape) * (tooth < teeth[:, None])
+        tilt = matched * (offset - 0.5) * rise
+        scores.append(np.exp((tilt - sigma.sum(axis=1)) * length / teeth))
+    return np.square(scores).mean(axis=0), teeth + 2.0 * matched, np.mean(scores, axis=0)
+
+
+def production_march(along: AlongRays) -> Expected:
+    """Steps at one offset, of which many are tried; what a cell of majorant 0 has is left out."""
+    step, stop = along.params["step"], along.params["stop"]
+    segments, medium = along.flight.segments, along.flight.medium
+    start = step * np.arange(np.ceil(segments[:, 6].max() / step))
+    width = np.clip(segments[:, 6:] - start, 0.0, step)
+    scores, lookups = [], []
+    for offset in (np.arange(OFFSETS) + 0.5) / OFFSETS:
+        points = along.points(start + offset * width)
+        some = (along.majorant_at(points) > 0.0) & (width > 0.0)
+        sigma = np.where(some, medium.sigma_t(points.reshape(-1, 3)).reshape(some.shape), 0.0)
+        depth = np.cumsum(sigma * width, axis=1)
+        bright = depth <= -np.log(stop)
+        scores.append(np.where(bright[:, -1], np.exp(-depth[:, -1]), 0.0))
+        # the step that makes it dark is looked up
+        lookups.append((some & np.insert(bright, 0, True, axis=1)[:, :-1]).sum(axis=1))
+    return np.square(scores).mean(axis=0), np.mean(lookups, axis=0), np.mean(scores, axis=0)
+
+
+def resampled(along: AlongRays) -> Expected:
+    """Ratio tracking, which a flight with a candidate leaves by 1 - scatter."""
+    second, lookups = ratio(along)[:2]
+    none = np.exp(-along.integral(along.majorant * (along.sigma > 0.0)))
+    return (second - none) / (1.0 - along.params["scatter"]) + none, lookups
+
+
+def collision(along: AlongRays) -> Expected:
+    """Each collision with itself, and with all that are still to come."""
+    share, left = along.sigma / along.majorant, along.sigma * along.step
+    reached = np.exp(-(np.cumsum(left, axis=1) - 0.5 * left))
+    still = 1.0 - along.transmittance[:, None] / reached
+    square = along.integral(along.sigma * reached * (share + 2.0 * (1.0 - share) * still))
+    return square - 1.0 + 2.0 * along.transmittance, binary(along)[1]
+
+
+def factored(along: AlongRays) -> Expected:
+    """Delta tracking of the residual, times what the control lets through."""
+    residual = along.sigma - along.control
+    through = np.exp(-along.integral(0.0 * residual + along.control))
+    lookups = along.until(0.0 * residual + along.majorant, residual)
+    return along.transmittance * through, lookups
+
+
+def hybrid(along: AlongRays) -> Expected:
+    """Backwards through constant cells: of flights (f) and of walks (w), from a cell's start on."""
+    medium, segments, majorant = along.flight.medium, along.flight.segments, along.majorant[:, 0]
+    pieces = medium.pieces(segments)
+    f, w, f_lookups, w_lookups = (np.full(len(segments), value) for value in (1.0, 1.0, 0.0, 0.0))
+    for start, span in zip(pieces.start.T[::-1], pieces.length.T[::-1], strict=True):
+        there = segments[:, :3] + (start + 0.5 * span)[:, None] * segments[:, 3:6]
+        sigma, some = medium.sigma_t(there), span > 0.0
+        thin = sigma < along.params["threshold"] * majorant
+        hit, lost = -np.expm1(-majorant * span), -np.expm1(-sigma * span)
+        null, rate = 1.0 - sigma / majorant, majorant - 2.0 * sigma
+        walked = np.exp(-2.0 * sigma * span) * w
+        begun = (majorant - sigma) * walked * -np.expm1(-rate * span) / rate
+        f = np.where(some, np.where(thin, (1.0 - hit) * f + begun, (1.0 - lost) * f), f)
+        w = np.where(some, np.where(thin, walked, f), w)
+        thick = (1.0 - lost) * f_lookups + majorant * lost / np.where(thin, 1.0, sigma)
+        begun = (1.0 - hit) * f_lookups + hit * (1.0 + null * (1.0 + w_lookups))
+        f_lookups = np.where(some, np.where(thin, begun, thick), f_lookups)
+        w_lookups = np.where(some, 1.0 + np.where(thin, w_lookups, f_lookups), w_lookups)
+    return f, f_lookups

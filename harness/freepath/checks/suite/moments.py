@@ -10,7 +10,7 @@ import numpy as np
 
 from freepath.checks.identities import check_count, check_mean, check_variance
 from freepath.checks.media import MAJORANTS, MEDIA
-from freepath.checks.model import Check
+from freepath.checks.model import FURTHER, Check
 from freepath.checks.rig import Flight, Rig
 from freepath.checks.suite import expectations as known
 from freepath.checks.verdict import demand
@@ -39,7 +39,20 @@ RELATIVES: dict[str, tuple[dict[str, Any], float, Callable[..., known.Expected]]
     "next_flight_delta": ({}, 1.5, known.cost_of(known.binary)),
     "next_flight_ratio": ({}, 1.5, known.cost_of(known.ratio)),
     "track_length": ({}, 1.5, known.track_length_cost),
+    "jackknife": ({}, 1, known.jackknife),
+    "jackknife_placed": ({}, 1, known.jackknife_placed),
+    "jackknife_placed-mean": ({"placement": "mean"}, 1, known.jackknife_placed),
+    "resampled": ({"scatter": 0.3}, 1.5, known.resampled),
+    "collision": ({}, 1.5, known.collision),
+    "decomposition_factored": ({}, 1.5, known.factored),
+    "hybrid": ({"threshold": 0.3}, 1.5, known.hybrid),
+    "biased_march": ({}, 1.5, known.biased_march),
+    "biased_march-free": ({"ends": "free"}, 1.5, known.biased_march),
+    "production_march": ({"step": 0.1, "stop": 0.1}, 1, known.production_march),
 }  # fmt: skip
+BY_CELLS = ("jackknife_placed", "production_march")
+IN_LAYERS = ("hybrid", "production_march")
+"""Of cells of constant extinction, of which one is empty, and so are some of the majorant."""
 
 
 def checks(catalog: Catalog) -> Iterator[Check]:
@@ -53,14 +66,17 @@ def checks(catalog: Catalog) -> Iterator[Check]:
                 yield _check(f"{tracker}/{medium}/{majorant}", tracker, axes, expected)
     for name, (parameters, tightness, known_of) in RELATIVES.items():
         tracker = name.partition("-")[0]
-        for medium in ("exponential", "trilinear"):
+        majorant = "grid" if tracker in BY_CELLS else "global"
+        cells = {"grid": {"resolution": [5, 3, 15]}} if majorant == "grid" else majorant
+        for medium in ("layered",) if tracker in IN_LAYERS else ("exponential", "trilinear"):
             axes = {"tracker": {tracker: parameters}, "medium": medium, "tightness": tightness}
+            axes |= {"lanes": 16, "majorant": cells}
             expected = partial(_relative, known_of)
-            yield _check(f"{name}/{medium}/global", tracker, axes | {"lanes": 16}, expected)
+            yield _check(f"{name}/{medium}/{majorant}", tracker, axes, expected)
 
 
 def _check(name: str, tracker: str, axes: dict[str, Any], expected: Any) -> Check:
-    speed = "fast" if "/trilinear/" in name and tracker in EXACT else "slow"
+    speed = "fast" if tracker in (EXACT if "/trilinear/" in name else FURTHER) else "slow"
     kernels = f"{tracker}/transmittance/{name.partition('/')[2]}"
     options = {"kernels": kernels, "axes": axes, "expected": expected}
     return Check.of(f"moments/{name}", (speed, "moments", tracker), as_derived, **options)
@@ -68,8 +84,9 @@ def _check(name: str, tracker: str, axes: dict[str, Any], expected: Any) -> Chec
 
 def _relative(known_of: Callable[..., known.Expected], flight: Flight) -> known.Expected:
     along = known.AlongRays(flight)
-    second, lookups = known_of(along)
-    return None if second is None else second - along.transmittance**2, lookups
+    second, lookups, *mean = known_of(along)
+    square = np.square(mean[0] if mean else along.transmittance)
+    return None if second is None else second - square, lookups, *mean
 
 
 def as_derived(
@@ -78,9 +95,9 @@ def as_derived(
     """An estimator may be right on average and play where it should weigh, or look up twice: its
     variance and its lookups must be those that are derived for it."""
     flight = rig.flight(**axes)
-    variance, lookups = expected(flight)
+    variance, lookups, *mean = expected(flight)
     samples = flight.record(SAMPLES)
-    check_mean(samples.round.moments, flight.reference(), alpha / 3)
+    check_mean(samples.round.moments, mean[0] if mean else flight.reference(), alpha / 3)
     check_count(samples.lookups, lookups, alpha / 3)
     thin = flight.depth <= THICKEST
     demand(np.count_nonzero(thin) > 100, "too few rays are thin enough")

@@ -43,14 +43,17 @@ NEAR_TRACKERS = ("equiangular", "tabulated", "joint", "combined")
 SHADOWS = (
     ("delta", "ratio"), ("delta", "next_flight_ratio"), ("analytic", "regular"),
     ("regular", "delta"), ("weighted_delta", "track_length"), ("decomposition", "residual_ratio"),
+    ("resampled", "resampled"), ("hybrid", "hybrid"),
 )  # fmt: skip
 SHARING = (
     ("delta", "ratio"), ("weighted_delta", "next_flight_ratio"), ("two_knob", "next_flight_delta"),
     ("delta", "delta"), ("delta", "split"), ("spectral", "spectral_ratio"),
 )  # fmt: skip
 """Pairs of which lanes on paths and on shadow rays share a lookup, where there is one to share."""
-EMITTED = ("delta", "analytic", "regular", "weighted_delta", "two_knob", "spectral")
+EMITTED = ("delta", "analytic", "regular", "weighted_delta", "two_knob", "spectral", "resampled")
 TOGETHER = (("regular", "regular"), ("weighted_delta", "ratio"))
+SHAPES = {"rayleigh": (0.0, 1.0), "cornette_shanks": (0.6, 1.0), "draine": (-0.9, 20.0)}
+"""Phase functions that are 1 + alpha cosine^2 times a lobe of g: g and alpha."""
 ANISOTROPIES = {"0.999": 0.999, "-0.999": -0.999, "1e-7": 1e-7, "-1e-9": -1e-9, "0.3": 0.3}
 GRAIN = 2.0**-23
 checks = Checks()
@@ -212,13 +215,17 @@ def several(rig: Rig, alpha: float, tracker: str, shadow: str) -> None:
     check_mean(joint, other.moments.mean, alpha)
 
 
-def phase_function(rig: Rig, alpha: float, g: float) -> None:
+def phase_function(
+    rig: Rig, alpha: float, g: float, kind: str = "henyey_greenstein", squared: float = 0.0
+) -> None:
     """A phase function that is not sampled as it is evaluated brings light that is not there; near
     0 and 1 its closed form divides 0 by 0."""
     # Cosines as they are drawn against the cumulated density, and the density against its form.
-    code = kernel_files.read("light/phase_henyey_greenstein").code
+    files = (*(("math/newton", "light/squared_cosine") if squared else ()), f"light/phase_{kind}")
+    code = "\n".join(kernel_files.read(name).code for name in files)
     code = code.replace("scene->optics.g", f"((SCALAR){g!r})")
-    lanes = Lanes(rig, 16, more=f"typedef int Scene;\n{code}")
+    code = code.replace("scene->optics.alpha", f"((SCALAR){squared!r})")
+    lanes = Lanes(rig, 16, more=f"#define ROUNDING 1.1920929e-7f\ntypedef int Scene;\n{code}")
     count, draws = 4096, 64
     body = "if (n == 0) rng = stream(seed, in0, 3ul, in1); "
     body += "const Scene *none = 0; out0 = sample_cosine(none, &rng); out1 = phase(none, out0);"
@@ -231,17 +238,25 @@ def phase_function(rig: Rig, alpha: float, g: float) -> None:
     ordered = np.sort(cosine.ravel())
     rank = np.arange(ordered.size + 1) / ordered.size
     # a cosine is rounded, which is much of the lobe of a g near 1
-    below = _cumulated(g, np.maximum(ordered - GRAIN, -1.0)) - rank[:-1]
-    above = rank[1:] - _cumulated(g, np.minimum(ordered + GRAIN, 1.0))
+    below = _cumulated(g, np.maximum(ordered - GRAIN, -1.0), squared) - rank[:-1]
+    above = rank[1:] - _cumulated(g, np.minimum(ordered + GRAIN, 1.0), squared)
     distance = max(below.max(), above.max(), 0.0)
     require(np.array([stats.kstwo.sf(distance, ordered.size)]), alpha, "cosines (KS)")
-    exact = (1.0 - g * g) / (4.0 * np.pi * ((1.0 - g) ** 2 + 2.0 * g * (1.0 - cosine)) ** 1.5)
-    error = np.max(np.abs(density / exact - 1.0))
+    error = np.max(np.abs(density / _density(g, cosine, squared) - 1.0))
     demand(error < 1e-3, f"the density is off by {error:.3g}")
 
 
-def _cumulated(g: float, cosine: np.ndarray) -> np.ndarray:
+def _density(g: float, cosine: np.ndarray, squared: float) -> np.ndarray:
+    lobe = (1.0 - g * g) / (4.0 * np.pi * ((1.0 - g) ** 2 + 2.0 * g * (1.0 - cosine)) ** 1.5)
+    return lobe * (1.0 + squared * cosine**2) / (1.0 + squared * (1.0 + 2.0 * g * g) / 3.0)
+
+
+def _cumulated(g: float, cosine: np.ndarray, squared: float) -> np.ndarray:
     """The chance of a smaller cosine."""
+    if squared:
+        at = np.linspace(-1.0, 1.0, 100_001)
+        both = _density(g, at[1:], squared) + _density(g, at[:-1], squared)
+        return np.interp(cosine, at, np.append(0.0, np.cumsum(np.pi * both * np.diff(at))))
     if abs(g) < 1e-3:
         return (1.0 + cosine) / 2.0 - 0.75 * g * (1.0 - cosine**2)
     root = 1.0 / np.sqrt((1.0 - g) ** 2 + 2.0 * g * (1.0 - cosine))
@@ -264,6 +279,8 @@ for (phase, g), depth in itertools.product(PHASES.items(), (1, 10, 100)):
     for kind in ("homogeneous", "grid"):
         name, keys = f"furnace/{kind}-tau-{depth}-{phase}/delta", {"sigma_t": depth, "g": g}
         _one(name, "delta", furnace, kind=kind, **keys)
+keys = {"sigma_t": 10, "phase": "draine", "g": -0.9, "alpha": 20}
+_one("furnace/draine/regular", "regular", furnace, kind="grid", **keys)
 for kind in ("grid", "stretched"):
     _one(f"furnace/{kind}/regular", "regular", furnace, kind=kind, sigma_t=30, g=0.9)
 for tracker, shadow in (*TOGETHER, *((name, "ratio") for name in NEAR_TRACKERS)):
@@ -275,6 +292,7 @@ for albedo, depth in itertools.product((0.3, 0.9), (0.5, 2.0, 8.0)):
     _one(f"rod/albedo-{albedo}-tau-{depth}/delta", "delta", rod, **keys)
 for sigma_t, g in itertools.product((0.1, 3.0, 30.0), (0.0, 0.7)):
     _one(f"length/tau-{sigma_t}-g-{g}/delta", "delta", length, sigma_t=sigma_t, g=g)
+_one("length/tau-3.0-g-0.7/march", "march", length, sigma_t=3.0, g=0.7)
 for kind, pairs in ((single, SHADOWS), (voxels, SHARING)):
     for turn, (tracker, shadow) in enumerate((*pairs, *pairs)):
         g = 0.0 if turn < len(pairs) else (0.6, -0.7)[turn % 2]
@@ -287,3 +305,5 @@ for (name, sampler), place in itertools.product(NEAR.items(), PLACES):
 _one("sky/spectral", "", sky)
 for name, g in ANISOTROPIES.items():
     _one(f"phase/g-{name}", "", phase_function, g=g)
+for kind, (g, squared) in SHAPES.items():
+    _one(f"phase/{kind}", "", phase_function, g=g, kind=kind, squared=squared)

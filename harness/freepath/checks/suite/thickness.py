@@ -30,6 +30,8 @@ ONLY_WEIGHS = (
 """Trackers that leave no rare event to a uniform number, which is a multiple of 2^-24."""
 WITHIN_1 = ("analytic", "decomposition", "delta", "march", "ratio", "regular", "split")
 """Trackers whose weights are products of probabilities where the majorant bounds."""
+TO_THE_END = (*SCORES_ON_ITS_WAY, "resampled")
+"""Trackers whose flights go to the end of the ray, whatever they score."""
 THICK = {"tau-50": 50.0, "tau-1e3": 1e3, "tau-1e6": 1e6}
 THIN = {"tau-1e-7": 1e-7, "tau-1e-12": 1e-12}
 
@@ -107,7 +109,7 @@ def thick(rig: Rig, alpha: float, tracker: Tracker, depth: float) -> None:
         demand(lookups <= 8.0 * depth + 1e5, f"{lookups:.3g} lookups for a path")
 
 
-@checks.hard("thick/free-path", lambda t: has_free_path(t) and t.name not in SCORES_ON_ITS_WAY)
+@checks.hard("thick/free-path", lambda t: has_free_path(t) and t.name not in TO_THE_END)
 def short_paths(rig: Rig, alpha: float, tracker: Tracker) -> None:
     """Free paths of a millionth of the ray are lost if distances are summed over what is left."""
     # The distribution of free paths in an optical depth of a million.
