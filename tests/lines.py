@@ -10,7 +10,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "harness" / "freepath"
 BUDGET = {
-    "checks": 5010,
+    "checks": 5026,
     "kernels": 3100,
     "scene": 3540,
     "show": 3150,

@@ -2,4 +2,4 @@
 
 from checks.support import those
 
-test_check = those("moments/")
+test_check = those("moments/", "lookups/as-derived/")

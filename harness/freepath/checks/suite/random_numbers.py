@@ -14,6 +14,7 @@ from freepath.checks.parts import Lanes
 from freepath.checks.rig import Change, Rig
 from freepath.checks.suite.common import Checks, everyone, fly, has_free_path, knows_depth
 from freepath.checks.verdict import demand, require
+from freepath.compose import kernel_files
 from freepath.compose.catalog import Tracker
 from freepath.config.models import MEDIA as MODELS
 
@@ -237,6 +238,19 @@ def ends(rig: Rig, alpha: float, tracker: Tracker, medium: str = "") -> None:
     demand((samples.t >= 0.0).all(), "a path that ends before it begins")
     beyond = np.max(samples.t - flight.segments[:, 6:])
     demand(beyond <= 1e-5, f"a path ends {beyond:.3g} beyond its ray")
+
+
+@checks.one("random-numbers/circle")
+def circle(rig: Rig, alpha: float) -> None:
+    """A series that is off by a part in 1000 turns directions, and makes them longer than 1: no
+    mean tells."""
+    u = np.arange(0, 2**24, 127)
+    code = kernel_files.read("math/circle_polynomial").code
+    body = "point_on_circle(to_real(in0) * 0x1p-24f, &out0, &out1);"
+    found = np.array(Lanes(rig, 16, more=code)(body, [u], ["real"] * 2, len(u)), float)[..., 0]
+    angle = 2.0 * np.pi * u / 2**24
+    error = np.abs(found - np.array([np.cos(angle), np.sin(angle)])).max()
+    demand(error < 4 * 2.0**-24, f"a point of the circle is off by {error:.3g}")
 
 
 for name in ULP:
