@@ -308,8 +308,8 @@ DIES = """\
 import os, sys
 from freepath.measure import worker
 from freepath.measure.sweep import Sweep
-groups = Sweep._groups
-Sweep._groups = lambda sweep, jobs: [[job] for group in groups(sweep, jobs) for job in group]
+groups = Sweep.groups
+Sweep.groups = lambda sweep, jobs: [[job] for group in groups(sweep, jobs) for job in group]
 run = Sweep._run
 def once(sweep, jobs):
     run(sweep, jobs)

@@ -136,11 +136,11 @@ def test_a_complete_run_is_not_run_again(go, work):
 class Interrupted(Sweep):
     """Is interrupted when its second row should be written."""
 
-    def _finish(self, job, row, rounds=(), *further):
+    def finish(self, row, rounds=(), *further):
         if len(rows()) == 1:
             self.folder._append("samples.csv", SAMPLE_COLUMNS, rounds)
             raise KeyboardInterrupt
-        super()._finish(job, row, rounds, *further)
+        super().finish(row, rounds, *further)
 
 
 def test_an_interrupted_run_is_completed(go, work, device, monkeypatch):

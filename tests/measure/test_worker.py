@@ -15,6 +15,7 @@ import pytest
 from freepath import api
 from freepath.errors import ResultError, RunError
 from freepath.measure import pictures, worker
+from freepath.measure import sweep as sweeps
 from freepath.results import folder as results
 from freepath.results.folder import read_rows
 from freepath.show.report import writing
@@ -98,17 +99,24 @@ def test_a_sweep_gets_past_what_ends_or_stops_it(command, tracker, status, reaso
     assert rows() == before
 
 
-def test_memory_that_runs_out_for_a_case(command, work):
-    """The limit holds for what a process maps; the majorant of one case needs more."""
-    majorants = "majorant=global,{grid: {resolution: [1, 1, 60000000]}}"
-    medium = "medium={exponential: {sigma_t: 1, scale_height: 1}}"
-    limited = ["bash", "-c", 'ulimit -v 2500000; exec "$@"', "-", *command]
-    done = ended([*limited, "-a", majorants, "-a", medium, "-a", "tracker=delta"])
-    assert done.returncode == 8, done.stderr
-    status = {row["majorant"]: row["status"] for row in rows()}
-    assert status.pop("global") == "ok"
-    assert set(status.values()) <= {"run_failed", "crashed"}
-    assert status
+def test_memory_that_runs_out_for_a_case(planted, device, monkeypatch):
+    """Beyond what is reckoned before; the others have their rows."""
+    made = sweeps.runner_of
+
+    def runner_of(case, *given):
+        if case.tracker == "ratio":
+            raise MemoryError("unable to allocate 9 GiB")
+        return made(case, *given)
+
+    monkeypatch.setattr(sweeps, "runner_of", runner_of)
+    api.sweep("planted.yaml", "out", devices=[device]).run()
+    assert {(row["tracker"], row["status"]) for row in rows()} == {
+        ("delta", "ok"),
+        ("ratio", "run_failed"),
+    }
+    assert {row["reason"] for row in rows() if row["tracker"] == "ratio"} == {
+        "out of memory: unable to allocate 9 GiB"
+    }
 
 
 def children(process):
