@@ -6,13 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import freepath
 from freepath import config
 from freepath.cases import plan
 from freepath.cli import main
-from freepath.commands.common import MARK, own_folder, volume_of
 from freepath.compose import catalog
 from freepath.errors import UsageError
 from freepath.extras import recommend
+from freepath.extras.given import MARK, own_folder, volume_of
 from freepath.extras.recommend import majorants_of, middle_of
 from freepath.extras.renderers import RENDERERS
 from freepath.results.folder import COLUMNS
@@ -212,7 +213,7 @@ def test_only_a_folder_of_its_own_is_emptied(work):
     assert (others / "notes.txt").read_text() == "mine"
 
 
-def test_what_is_known_is_told_when_it_is_interrupted(call, cloud, monkeypatch):
+def test_what_is_known_is_told_when_it_is_interrupted(call, cloud, selector, monkeypatch):
     def interrupted(search):
         search.side = 2.0
         search.note(
@@ -231,6 +232,10 @@ def test_what_is_known_is_told_when_it_is_interrupted(call, cloud, monkeypatch):
         "sigma_t is the default, 1:",
     ):
         assert told in text
+    found = freepath.recommend(cloud, sigma_t=1, devices=selector, output="again")
+    assert (found.interrupted, found.best.tracker) == (True, "march")
+    kept = [line for line in str(found).splitlines() if not re.search("again|measured in", line)]
+    assert set(kept) < set(text.splitlines())
 
 
 def test_a_budget_that_is_used_up_says_what_is_missing():

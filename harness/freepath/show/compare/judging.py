@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import stats
 
+from freepath.errors import expect
 from freepath.show.compare.pairing import Key, Side
 from freepath.show.compare.timing import Change, changes
 from freepath.show.table import FAILED, Row, number
@@ -39,6 +40,12 @@ class Settings:
     judge that by the runs, where there are several, and else to take all of it for drift."""
     times: bool = True
     """Whether times are compared."""
+
+    def __post_init__(self) -> None:
+        """Raise UsageError for what is none of these."""
+        expect("alpha", 0 < self.alpha < 1, "a share between 0 and 1", self.alpha)
+        expect("factor", self.factor >= 1, "a ratio of 1 or more", self.factor)
+        expect("drift", (self.drift or 1) >= 1, "a ratio of 1 or more, or None", self.drift)
 
     @property
     def to_show(self) -> float:
