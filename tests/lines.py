@@ -13,15 +13,15 @@ BUDGET = {
     "checks": 4600,
     "kernels": 3100,
     "scene": 3000,
-    "show": 3420,
+    "show": 3630,
     "measure": 2620,
     "config": 2115,
-    "commands": 1480,
+    "commands": 1530,
     "device": 1400,
     "compose": 1000,
     "results": 680,
     "extras": 1175,
-    "modules on the first floor": 450,
+    "modules on the first floor": 455,
     "cases": 300,
 }
 

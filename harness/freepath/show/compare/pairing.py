@@ -62,10 +62,11 @@ def load(path: Path) -> Side:
         raise FreepathError(
             f"{path}: expected the folder of a run, with {SUMMARY} in it, or of several runs"
         )
-    return Side(str(path), [_run(folder) for folder in folders])
+    return Side(str(path), [run_of(folder) for folder in folders])
 
 
-def _run(folder: Path) -> Run:
+def run_of(folder: Path) -> Run:
+    """The run in a folder, without cases that were skipped."""
     cases, rounds = read_result(folder)
     rows = {_key(row): row for row in cases if row["status"] != "skipped"}
     times: dict[Key, dict[int, float]] = defaultdict(dict)
