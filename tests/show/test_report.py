@@ -12,7 +12,7 @@ from freepath.cli import main
 from freepath.errors import FreepathError
 from freepath.measure import pictures
 from freepath.results.folder import CONFIRM_COLUMNS
-from freepath.show.report import load, write
+from freepath.show.report import Choice, load, write
 from freepath.show.report.pictures import picture
 from freepath.show.report.text import markdown, sentences
 from support.many import many
@@ -93,7 +93,7 @@ def test_devices_differ_in_their_lines(tmp_path, chart):
     assert len(set(cut.values())) == 2
     assert all(len(shown) < 50 for shown in cut.values())
     svg = tmp_path / "p.svg"
-    write([tmp_path / "two"], svg, None, chart)
+    write([tmp_path / "two"], svg, None, Choice(chart))
     assert all(shown in svg.read_text() for shown in cut.values())
     # a single device leaves the dashes to the majorants, and needs no legend
     alone = load([result_of(tmp_path / "one", [r for r in rows if r["driver_version"][2] == "0"])])
@@ -185,7 +185,7 @@ def test_markdown_and_what_is_asked_for_is_printed(result, capfdbinary):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["-o", "p.pdf"], "expected a name that ends in one of .html, .md, .svg, .png"),
+        (["-o", "p.eps"], "expected a name that ends in one of .html, .md, .svg, .png"),
         (["--format", "md", "-o", "p.svg"], "--format md does not fit p.svg"),
         (["--chart", "pareta", "-o", "p.svg"], "did you mean 'pareto'?"),
         (["-o", "none/p.html"], "cannot write none/p.html: No such file or directory"),

@@ -142,7 +142,7 @@ class Result:
     def chart(self, name: str = "cost", **options: Any) -> Any:
         """A chart by its name, as an altair.Chart; docs/report.md names them.
 
-        `options` are those of `freepath.show.report.pictures.picture`: width, title.
+        `options` are `width`, of a panel in pixels, and `titled`.
         """
         from freepath.show.report.pictures import picture
 
