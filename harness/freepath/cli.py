@@ -13,6 +13,7 @@ import shtab
 
 from freepath import __version__
 from freepath.commands import (
+    ab,
     check,
     compare,
     devices,
@@ -38,6 +39,7 @@ COMMANDS = {
     "new-tracker": new_tracker,
     "report": report,
     "compare": compare,
+    "ab": ab,
     "export": export,
     "source": source,
     "schema": schema,

@@ -38,13 +38,21 @@ def add(commands: Any) -> None:
         "contender", type=Path, nargs="+", metavar="CONTENDER", help="what to judge; may be several"
     ).complete = shtab.DIRECTORY
     compare.add_argument(
+        "-o", "--output", type=Path, metavar="FILE", help="a .csv, .html, .json or .md to write"
+    ).complete = shtab.FILE
+    add_judging(compare)
+
+
+def add_judging(command: Any) -> None:
+    """What is said of two sides, and how."""
+    command.add_argument(
         "--alpha",
         type=_share,
         default=0.05,
         metavar="A",
         help="expected share of false findings among the findings (default: 0.05)",
     )
-    compare.add_argument(
+    command.add_argument(
         "--factor",
         type=_ratio,
         default=1.01,
@@ -52,7 +60,7 @@ def add(commands: Any) -> None:
         help="ratio of times, variances or estimates that is too small to matter, as 1.05 or 5%% "
         "(default: 1.01)",
     )
-    compare.add_argument(
+    command.add_argument(
         "--drift",
         type=_ratio,
         metavar="F",
@@ -60,14 +68,14 @@ def add(commands: Any) -> None:
         "a reason, to be taken out of each case (default: all of it, unless several runs on either "
         "side show that it is no drift)",
     )
-    compare.add_argument("--no-times", action="store_true", help="do not compare times")
-    compare.add_argument("--all", action="store_true", help="print the cases that did not change")
-    compare.add_argument(
+    command.add_argument("--no-times", action="store_true", help="do not compare times")
+    command.add_argument("--all", action="store_true", help="print the cases that did not change")
+    command.add_argument(
         "--other-machine",
         action="store_true",
         help="compare results of different machines nevertheless",
     )
-    compare.add_argument(
+    command.add_argument(
         "--fail-on",
         type=_words,
         default=("SLOWER", "MORE_NOISE", "DIFFERENT", "MISSING"),
@@ -75,19 +83,16 @@ def add(commands: Any) -> None:
         help="verdicts that make exit code 1, e.g. SLOWER,UNDECIDED, or none (default: "
         "SLOWER,MORE_NOISE,DIFFERENT,MISSING)",
     )
-    compare.add_argument("--format", choices=FORMATS, help="what to write")
+    command.add_argument("--format", choices=FORMATS, help="what to write")
     for name in ("json", "md"):
-        compare.add_argument(
+        command.add_argument(
             f"--{name}",
             action="store_const",
             dest="format",
             const=name,
             help=f"the same as --format {name}",
         )
-    compare.add_argument(
-        "-o", "--output", type=Path, metavar="FILE", help="a .csv, .html, .json or .md to write"
-    ).complete = shtab.FILE
-    compare.add_argument(
+    command.add_argument(
         "--output-junit", type=Path, metavar="FILE", help="write verdicts as JUnit XML"
     ).complete = shtab.FILE
 

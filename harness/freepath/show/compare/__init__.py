@@ -2,6 +2,9 @@
 
 from freepath.show.compare.comparison import Comparison, comparison
 from freepath.show.compare.judging import VERDICTS, Judged, Settings, compare
-from freepath.show.compare.pairing import Side, load
+from freepath.show.compare.pairing import Side, load, on_device_of
 
-__all__ = ["VERDICTS", "Comparison", "Judged", "Settings", "Side", "compare", "comparison", "load"]
+__all__ = [
+    "VERDICTS", "Comparison", "Judged", "Settings", "Side", "compare", "comparison", "load",
+    "on_device_of",
+]  # fmt: skip

@@ -133,6 +133,27 @@ def _listed(values: set[str]) -> str:
     return " or ".join(f"'{one}'" for one in first) + (", ..." if len(values) > 2 else "")
 
 
+def on_device_of(reference: Side, contender: Side) -> Side:
+    """The contender as if its device were the reference's, so that the cases of both pair.
+
+    Raises FreepathError where a side has several devices.
+    """
+    places = [{key[1:] for run in side.runs for key in run.rows} for side in (reference, contender)]
+    if any(len(found) != 1 for found in places):
+        names = [" / ".join(place) for found in places for place in sorted(found)]
+        raise FreepathError(f"expected a device on either side, got {', '.join(names)}")
+    (place,) = places[0]
+
+    def moved(found: dict[Key, Any]) -> dict[Key, Any]:
+        return {(key[0], *place): value for key, value in found.items()}
+
+    runs = [
+        Run(moved(one.rows), moved(one.times), moved(one.variances), one.host)
+        for one in contender.runs
+    ]
+    return Side(contender.name, runs)
+
+
 def scenes(run: Run) -> dict[Key, list[Key]]:
     """The cases that were measured in turns: those of a medium and its rays on a device."""
     found: dict[Key, list[Key]] = defaultdict(list)
