@@ -20,7 +20,7 @@ BUDGET = {
     "device": 1400,
     "compose": 1000,
     "results": 680,
-    "extras": 1175,
+    "extras": 1180,
     "modules on the first floor": 455,
     "cases": 300,
 }

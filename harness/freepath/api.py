@@ -142,5 +142,10 @@ def compare(
     names = comparing.Settings.__dataclass_fields__
     for name in settings:
         expect("compare", name in names, f"arguments of {', '.join(names)}", name)
-    sides = [comparing.load(Path(getattr(one, "folder", one))) for one in (reference, contender)]
+    sides = []
+    for name, one in (("reference", reference), ("contender", contender)):
+        expect(name, not getattr(one, "including", ""), "a whole result, not of `only`", one)
+        folder = getattr(one, "folder", one)
+        expect(name, isinstance(folder, (str, os.PathLike)), "a result or its folder", one)
+        sides.append(comparing.load(Path(folder)))
     return comparing.comparison(*sides, comparing.Settings(**settings), other_machine)

@@ -98,6 +98,20 @@ def test_verdicts(changes, verdict):
     }
 
 
+def test_code_that_draws_other_numbers_is_compared_by_z():
+    """0.0001 is 0.14 standard errors: another estimate of the same samples, or chance."""
+    for same, estimate, verdict in (
+        (True, "0.5001", "DIFFERENT"),
+        (False, "0.5001", "SAME"),
+        (False, "0.51", "DIFFERENT"),
+    ):
+        random = np.random.default_rng(1)
+        (before, key), (after, _) = side(random), side(random, estimate=estimate)
+        settings = compare.Settings(factor=1.05, drift=2.0, same_samples=same)
+        judged, _ = compare.compare(before, after, settings)
+        assert {one.key: one.verdict for one in judged}[key] == verdict
+
+
 @pytest.mark.parametrize(("estimate", "verdict"), [("0.5001", "SAME"), ("0.51", "DIFFERENT")])
 def test_cases_without_an_exact_value_are_compared(estimate, verdict):
     random = np.random.default_rng(1)
@@ -296,6 +310,22 @@ def test_without_rounds_nothing_is_the_same(runs):
     assert {(one.verdict, one.why) for one in judged} == {
         ("UNDECIDED", "no rounds to compare times by")
     }
+
+
+def test_a_result_whose_rounds_were_cut_is_refused(tmp_path, capsys):
+    """84 rounds as the summary has it, of which 2 are left."""
+    run = modelled(np.random.default_rng(1), rounds=84)
+    for row in run.rows.values():
+        row |= {"rounds": "84", "samples_per_ray": "1000", "rays": "84", "run_id": ""}
+    folder = write(tmp_path / "a", run)
+    assert main(["compare", str(folder), str(folder), "--drift", "2"]) == 0
+    lines = (folder / "samples.csv").read_text().splitlines(keepends=True)
+    kept = [line for line in lines[1:] if int(line.split(",")[5]) < 2]
+    (folder / "samples.csv").write_text("".join([lines[0], *kept]))
+    assert main(["compare", str(folder), str(folder)]) == 2
+    told = capsys.readouterr().err
+    assert "a/summary.csv:2: transmittance/m/c0/auto/strict: expected 84 rounds of 84000" in told
+    assert "found 2 of 2000: a file was cut or changed" in told
 
 
 def test_percent_signs_are_taken(tmp_path, runs, capsys):

@@ -168,6 +168,12 @@ def test_a_run_from_python(work, selector):
         (lambda: freepath.load(3), "result: expected the folder of a run, got 3"),
         (lambda: freepath.load("none"), "none: expected the folder of a run"),
         (lambda: freepath.compare("a", "b", alpha=2), "alpha: expected a share .*got 2"),
+        (lambda: freepath.compare("a", "b", drift="1%"), "drift: expected a ratio .*got '1%'"),
+        (lambda: freepath.compare("a", 3), "contender: expected a result or its folder, got 3"),
+        (
+            lambda: freepath.compare(freepath.load("a").only("delta"), "b"),
+            "reference: expected a whole result, not of `only`",
+        ),
         (lambda: freepath.compare("a", "b", faktor=2), "expected arguments of alpha.*'faktor'"),
         (lambda: freepath.recommend(3), "volume: expected the path of a volume, got 3"),
         (lambda: freepath.recommend("a", accuracy=1), "accuracy: expected a relative RMSE.*got 1"),

@@ -142,4 +142,4 @@ def execute(options: Namespace) -> int:
     before, after = (compare.load(base / side) for side in refs)
     if kinds["after"] == "device":
         after = compare.on_device_of(before, after)
-    return judge(options, before, [after])
+    return judge(options, before, [after], same_samples=kinds["after"] == "checkout")

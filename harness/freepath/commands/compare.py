@@ -132,13 +132,15 @@ def execute(options: Namespace) -> int:
     return judge(options, reference, [compare.load(path) for path in options.contender])
 
 
-def judge(options: Namespace, reference: Side, sides: Sequence[Side]) -> int:
+def judge(
+    options: Namespace, reference: Side, sides: Sequence[Side], *, same_samples: bool = True
+) -> int:
     """Compare sides with a reference and show that; returns the exit code."""
     from freepath.show import compare
 
     wanted = _format(options)
     settings = compare.Settings(
-        options.alpha, options.factor, options.drift, times=not options.no_times
+        options.alpha, options.factor, options.drift, not options.no_times, same_samples
     )
     found = [compare.comparison(reference, s, settings, options.other_machine) for s in sides]
     _write(options, wanted, found)

@@ -27,7 +27,7 @@ from freepath.measure.sweep import Clock, Listener, Sweep
 from freepath.results.folder import RUN, SUMMARY, ResultFolder, Row, new_folder, read_result
 from freepath.scene.volumes.reading import read_volume
 from freepath.show import answers
-from freepath.show.table import failures, seconds
+from freepath.show.table import failures, number, seconds, settled, uncertainty
 
 SEED = 7
 RAYS = {"orthographic": {"resolution": [32, 32], "direction": [0.3, 0.2, 1]}}
@@ -64,6 +64,8 @@ class Finding:
     case: answers.Case
     axes: Axes
     """Tracker, majorant and tightness as a config has them."""
+    rough: bool = False
+    """Whether its time alone is not known, as on a busy machine: measured longer it may be."""
 
     @property
     def rank(self) -> tuple[bool, float]:
@@ -72,8 +74,12 @@ class Finding:
 
     @property
     def hope(self) -> tuple[bool, float]:
-        """By the lower end of its interval: what is known roughly is not given up for that."""
-        return not self.case.settled, self.case.time_s * max(0.0, 1.0 - self.case.noise)
+        """By the lower end of its interval: what is known roughly is not given up for that.
+
+        One whose time alone is not known stands by its middle, as its lower end may be 0.
+        """
+        less = self.case.noise if self.case.settled else 0.0
+        return not (self.case.settled or self.rough), self.case.time_s * (1.0 - less)
 
 
 @dataclasses.dataclass
@@ -328,7 +334,9 @@ class Search:
         if one is None:
             self.found.pop(row["case"], None)
         elif one.settled or old is None or not old.case.settled:
-            self.found[row["case"]] = Finding(one, axes)
+            per_sample, noise = number(row, "time_per_sample_s"), number(row, "variance_noise")
+            rough = not one.settled and settled(uncertainty(one.time_s, per_sample, 0.0, noise))
+            self.found[row["case"]] = Finding(one, axes, rough)
 
     def _why_none(self, rows: Sequence[dict[str, str]], folder: Path) -> str:
         failed = failures(rows)
