@@ -1,5 +1,10 @@
 import dataclasses
+import re
+import subprocess
+import sys
+import tracemalloc
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import psutil
@@ -13,6 +18,8 @@ from freepath.device.limits import joined, parts_of
 from freepath.errors import DriverLimitError
 from freepath.measure.runner import Pace, Runner
 from freepath.results.folder import read_rows
+from freepath.scene import majorants
+from freepath.scene.media.formulas import Homogeneous
 
 
 @pytest.fixture
@@ -147,16 +154,44 @@ def test_the_range_that_float32_holds(scaled, estimand, sizes, beyond):
         assert not output.exists()
 
 
-def test_a_majorant_that_does_not_fit_is_refused(work, selector, capsys, monkeypatch):
+def test_a_majorant_that_does_not_fit_is_refused(work, selector):
+    """In a process that may take 4 GiB: a grid one cell thick is nine times as large in memory."""
     (work / "x.yaml").write_text(
         "name: x\nmatrix: {medium: {homogeneous: {sigma_t: 1}}, tracker: delta,\n"
         "  majorant: {grid: {resolution: [1, 1, 134217728]}}}\n"
     )
-    monkeypatch.setattr(environment, "memory_left", lambda: 2**30)
-    assert cli.main(["run", "x.yaml", "-d", selector, "-o", "out"]) == 2
-    wanted = "its majorant of 134217728 cells takes 6 GiB, 1 are left"
-    assert wanted in capsys.readouterr().err
+    limited = (
+        "import resource, sys; from freepath import cli; "
+        "resource.setrlimit(resource.RLIMIT_AS, (2**32, 2**32)); "
+        f"sys.exit(cli.main(['run', 'x.yaml', '-d', {selector!r}, '-o', 'out']))"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", limited], check=False, capture_output=True, text=True
+    )
+    assert ended.returncode == 2, ended.stderr
+    assert re.search(
+        r"its majorant of 134217728 cells takes 22 GiB, [0-3]\S* are left", ended.stderr
+    )
     assert not Path("out").exists()
+
+
+@pytest.mark.parametrize("kind", ["grid", "octree"])
+@pytest.mark.parametrize("control", [None, "middle", "mean"])
+@pytest.mark.parametrize("shape", [(2, 3, 2**10), (32, 64, 32)])
+def test_what_a_majorant_takes_is_told_beforehand(kind, control, shape):
+    """At least what is seen while it is made and its copy, and not more than three times that."""
+    given = 64 if kind == "octree" else shape
+    model = SimpleNamespace(kind=kind, resolution=given, slack=1.1)
+    medium = Homogeneous(1.0, (1.0, 1.0, 1.0))
+    cells = majorants.cells_of(model)[::-1]
+    bounds = np.ones(cells), np.full(cells, 2.0)
+    asked = {"control": control, "share": 1.0} if control else None
+    tracemalloc.start()
+    before = tracemalloc.get_traced_memory()[0]
+    made = majorants.build(model, medium, bounds, 2.0, asked)
+    seen = tracemalloc.get_traced_memory()[1] - before + bounds[0].nbytes * 2 + made.data.nbytes
+    tracemalloc.stop()
+    assert seen <= majorants.bytes_of(model, control) <= 3 * seen
 
 
 def test_the_memory_that_is_left():

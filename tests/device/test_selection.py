@@ -32,9 +32,11 @@ def offered(monkeypatch, device):
     return one, two, bad, infos
 
 
-def test_the_default_is_the_first_that_works(offered, monkeypatch):
+def test_the_default_is_the_first_that_works(offered, monkeypatch, capsys):
     one, two, _, infos = offered
     assert resolve([]) == [Part(one, [infos[one]])]
+    why = "one is used, as another cannot be: bad: error: unknown target CPU"
+    assert capsys.readouterr().err == f"freepath: {why}\n"
     monkeypatch.setenv(selection.DEFAULT, "two")
     assert resolve([]) == [Part(two, [infos[two]])]
     monkeypatch.setattr(drivers, "DRIVERS", drivers.DRIVERS[:2])

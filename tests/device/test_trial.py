@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from freepath import paths
-from freepath.device import cpu_name, drivers, trial
+from freepath.device import cpu_name, drivers, environment, trial
 from freepath.device.trial import Outcome, outcomes
 from support.made_up import made_up
 
@@ -73,6 +73,16 @@ def test_an_outcome_is_kept_until_something_changes(device, monkeypatch, tmp_pat
     trial.cache_file().unlink()
     trial.cache_file().mkdir()
     assert tries() == 6, "a cache that cannot be written"
+
+
+def test_what_ran_out_of_time_on_a_busy_machine_is_not_kept(device, monkeypatch):
+    monkeypatch.setattr(trial, "TRIAL_S", 0.5)
+    hangs = process(device, "import time; time.sleep(60)")
+    for load, kept in ((1000.0, 0), (0.0, 1)):
+        monkeypatch.setattr(environment, "load", lambda load=load: load)
+        (outcome,) = outcomes([hangs])
+        assert "within 0.5 s" in outcome.reason
+        assert len(trial._kept()) == kept
 
 
 def test_the_trial_sees_a_kernel_that_is_wrong(device, monkeypatch):
@@ -169,10 +179,6 @@ def planted(tmp_path, monkeypatch):
 
 def test_a_cpu_that_the_wheel_does_not_know_is_mended(planted):
     """The fault of CPUs that came after its compiler, on any CPU."""
-    code, out, err = planted("generic", "devices", "--json")
-    assert code == 0, err
-    (wheel,) = [record for record in json.loads(out) if record["-d"] == "pocl-wheel"]
-    assert wheel["works"] is True
     words = ["run", "quick", "-d", "pocl-wheel", "-R", "exponential.*delta", "-o", "planted"]
     code, out, err = planted("generic", *words)
     assert code == 0, err
@@ -196,10 +202,11 @@ def test_a_driver_that_builds_nothing_is_named_by_every_command(planted, tmp_pat
     mine = (paths.KERNELS / "trackers/delta.cl").read_text("utf-8")
     (tmp_path / "mine.cl").write_text(mine)
     cause = "its process was ended by SIGABRT" if name == "crash" else "unknown target CPU 'znver9'"
-    code, out, _ = planted(name, "devices", "--json")
-    (wheel,) = [record for record in json.loads(out) if record["-d"] == "pocl-wheel"]
-    assert code == 0
-    assert cause in wheel["works"]
+    if name == "znver9":
+        code, out, _ = planted(name, "devices", "--json")
+        (wheel,) = [record for record in json.loads(out) if record["-d"] == "pocl-wheel"]
+        assert code == 0
+        assert cause in wheel["works"]
     for words in COMMANDS if name == "znver9" else COMMANDS[:1]:
         code, out, err = planted(name, *words, "-d", "pocl-wheel")
         assert code == 2, (words, out, err)

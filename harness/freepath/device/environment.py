@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import platform
+import resource
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -35,8 +36,11 @@ def load() -> float:
 
 
 def memory_left() -> int:
-    """Bytes that this process may still take, of the machine and of its control group."""
+    """Bytes that this process may still take, of the machine, its control group and its limit."""
     left = [psutil.virtual_memory().available]
+    most, _ = resource.getrlimit(resource.RLIMIT_AS)
+    if most != resource.RLIM_INFINITY:
+        left.append(most - psutil.Process().memory_info().vms)
     with contextlib.suppress(OSError, ValueError):  # "max" is no number
         most, taken = (
             int(Path(f"/sys/fs/cgroup/memory.{name}").read_text()) for name in ("max", "current")

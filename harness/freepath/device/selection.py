@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -54,11 +55,17 @@ def resolve(selectors: Sequence[str]) -> Parts:
 
 
 def default() -> Part:
-    """The first driver that works here, with its first device; raises DeviceError without one."""
+    """The first driver that works here, with its first device; raises DeviceError without one.
+
+    Says on standard error which came before it and why they cannot be used.
+    """
     tried = []
     for driver in drivers.installed():
         (outcome,) = outcomes([driver])
         if outcome.working:
+            for before in tried:
+                told = f"{driver.name} is used, as another cannot be: {before.strip()}"
+                print(f"freepath: {told}", file=sys.stderr)
             return Part(driver, outcome.working[:1])
         if driver is not drivers.OTHERS or not outcome.reason.startswith(NOTHING):
             tried.append(f"  {driver.name}: {outcome.reason}")

@@ -63,6 +63,8 @@ class Outcome:
     """For each of them why it cannot be used; '' where it can."""
     failure: str = ""
     """What became of its process, where that went wrong; why it lists no device."""
+    doubtful: bool = False
+    """Whether its time ran out on a busy machine: then it is tried again the next time."""
 
     @property
     def working(self) -> list[DeviceInfo]:
@@ -95,13 +97,14 @@ def outcomes(wanted: Sequence[Driver], *, afresh: bool = False) -> list[Outcome]
         fresh = dict(zip(missing, pool.map(_tried, missing), strict=True))
     if fresh:
         known = dict(zip(wanted, keys, strict=True))
-        _keep({known[driver]: dataclasses.asdict(one) for driver, one in fresh.items()})
+        certain = {driver: one for driver, one in fresh.items() if not one.doubtful}
+        _keep({known[driver]: dataclasses.asdict(one) for driver, one in certain.items()})
     return [fresh.get(d) or _outcome(kept[key]) for d, key in zip(wanted, keys, strict=True)]
 
 
 def _tried(driver: Driver) -> Outcome:
     """Run the trial of a driver in its process; what it could say before it ended counts."""
-    why = ""
+    why, doubtful = "", False
     try:
         ended = drivers.in_process_of(
             driver, [], module="freepath.device.trial", capture=True, timeout=TRIAL_S
@@ -114,6 +117,7 @@ def _tried(driver: Driver) -> Outcome:
             (text or b"").decode("utf-8", "replace") for text in (error.stdout, error.stderr)
         )
         why = f"it did not build and run a kernel within {TRIAL_S:g} s and was stopped"
+        doubtful = environment.load() > (os.cpu_count() or 1)
     except OSError as error:
         out, said, why = "", "", str(error)
     records: dict[str, dict[str, Any]] = {}
@@ -127,7 +131,7 @@ def _tried(driver: Driver) -> Outcome:
     if not infos:
         last = (said.strip().splitlines() or [""])[-1]
         why = "; ".join(filter(None, (why or NOTHING, _cache_folder(), last)))
-    return Outcome(infos, failures, why)
+    return Outcome(infos, failures, why, doubtful)
 
 
 def _cache_folder() -> str:

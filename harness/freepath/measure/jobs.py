@@ -47,7 +47,8 @@ def _check_memory(case: Case) -> None:
     if case.majorant is None:
         return
     cells = math.prod(majorants.cells_of(case.majorant))
-    needed, left = cells * majorants.BYTES_PER_CELL, environment.memory_left()
+    needed = majorants.bytes_of(case.majorant, case.params.get("control"))
+    left = environment.memory_left()
     if needed > left:
         sizes = f"{needed / 2**30:.3g} GiB, {left / 2**30:.3g} are left"
         raise UsageError(f"{case.name}: its majorant of {cells} cells takes {sizes}")

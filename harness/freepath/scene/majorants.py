@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -26,8 +27,6 @@ class Majorant:
     """How far the control lies above the extinction at most, relative to the highest extinction."""
 
 
-BYTES_PER_CELL = 48
-"""What building a majorant takes at most: two bounds, a mean, a control, the result and a copy."""
 EXCESS = 1e-6
 """How far above the extinction a control may be by rounding, relative to the majorant."""
 
@@ -58,6 +57,29 @@ def cells_of(model: Any) -> tuple[int, int, int]:
     if model.kind == "octree":
         return (model.resolution,) * 3
     return (1, 1, 1) if model.kind == "global" else tuple(model.resolution)
+
+
+def bytes_of(model: Any, control: Any) -> int:
+    """What a config's majorant takes at most while it is made, its copy on a device included.
+
+    Over its cells these are float64 arrays; what a kernel reads are float32 arrays, each of them
+    twice and two more in the making; means are taken over the points of a layer of cells.
+    """
+    octree, controlled, (nx, ny, _) = model.kind == "octree", control is not None, cells_of(model)
+    layer = nx * ny * POINTS**3 * 64 if control == "mean" else 0
+    per_cell, arrays = 32 + 48 * controlled + 32 * octree, 1 + controlled + octree
+    stored = math.prod(_stored(model)) * 8 * (arrays + 1)
+    return math.prod(cells_of(model)) * per_cell + stored + layer
+
+
+def _stored(model: Any) -> tuple[int, ...]:
+    """The cells (nx, ny, nz) that a kernel reads.
+
+    The walk through a grid may step one cell too far where rounding puts a plane just inside the
+    ray's end, so a grid has a border; that through an octree holds its cell inside.
+    """
+    border = 1 if model.kind == "grid" else 0
+    return tuple(n + 2 * border for n in cells_of(model))
 
 
 def build(
@@ -97,12 +119,13 @@ def _packed(model: Any, medium: Medium, arrays: list[np.ndarray | None]) -> Majo
         numbers = {f"n{axis}": n for axis, n in zip("xyz", cells, strict=True)}
     per_length = np.array(cells) / medium.extent
     numbers |= dict(zip(PER_LENGTH, per_length.tolist(), strict=True))
-    # The walk through a grid may step one cell too far where rounding puts a plane just inside the
-    # ray's end; that through an octree holds its cell inside.
-    padding = 1 if model.kind == "grid" else 0
-    padded = [np.pad(array, padding, mode="edge") for array in given]
-    numbers["cells"] = padded[0].size
-    return Majorant(numbers, np.stack(padded).astype(np.float32))
+    stored = _stored(model)
+    border = (stored[0] - cells[0]) // 2
+    data = np.empty((len(given), *reversed(stored)), np.float32)
+    for one, array in zip(data, given, strict=True):
+        one[...] = np.pad(array.astype(np.float32), border, mode="edge")
+    numbers["cells"] = data[0].size
+    return Majorant(numbers, data)
 
 
 def _joined(
