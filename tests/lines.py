@@ -12,15 +12,15 @@ PACKAGE = ROOT / "harness" / "freepath"
 BUDGET = {
     "checks": 4600,
     "kernels": 3100,
-    "scene": 3000,
+    "scene": 3001,
     "show": 3850,
     "measure": 2620,
     "config": 2115,
     "commands": 1700,
-    "device": 1400,
+    "device": 1402,
     "compose": 1000,
     "results": 680,
-    "extras": 1180,
+    "extras": 1205,
     "modules on the first floor": 455,
     "cases": 300,
 }
