@@ -10,19 +10,19 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "harness" / "freepath"
 BUDGET = {
-    "checks": 5026,
-    "kernels": 3100,
-    "scene": 3540,
-    "show": 3150,
-    "measure": 2621,
-    "config": 2100,
-    "commands": 1795,
-    "device": 1402,
+    "checks": 5220,
+    "kernels": 3600,
+    "scene": 3565,
+    "show": 3865,
+    "measure": 3225,
+    "config": 2135,
+    "commands": 1965,
+    "device": 1410,
     "compose": 1000,
-    "results": 680,
-    "extras": 1025,
-    "modules on the first floor": 450,
-    "cases": 300,
+    "results": 840,
+    "extras": 1395,
+    "modules on the first floor": 510,
+    "cases": 320,
 }
 
 

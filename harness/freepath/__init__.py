@@ -5,11 +5,18 @@ from typing import Any
 
 __version__ = "0.2.0"
 
-__all__ = ["__version__", "load", "run"]
+_FROM = {
+    "run": "api",
+    "load": "api",
+    "compare": "api",
+    "recommend": "extras.recommend",
+    "try_tracker": "extras.candidate",
+}
+__all__ = ["__version__", "compare", "load", "recommend", "run", "try_tracker"]
 
 
 def __getattr__(name: str) -> Any:
-    """Load `run` and `load` when they are first asked for: they need far more than a version."""
-    if name in ("run", "load"):
-        return getattr(import_module("freepath.api"), name)
+    """Load what is asked for when it is: that needs far more than a version does."""
+    if name in _FROM:
+        return getattr(import_module(f"freepath.{_FROM[name]}"), name)
     raise AttributeError(f"module 'freepath' has no attribute '{name}'")

@@ -13,10 +13,12 @@ import shtab
 
 from freepath import __version__
 from freepath.commands import (
+    ab,
     check,
     compare,
     devices,
     explain,
+    export,
     listing,
     merge,
     new_tracker,
@@ -42,6 +44,8 @@ COMMANDS = {
     "merge": merge,
     "report": report,
     "compare": compare,
+    "ab": ab,
+    "export": export,
     "source": source,
     "schema": schema,
     "list": listing,

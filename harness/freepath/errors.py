@@ -80,6 +80,12 @@ class UsageError(FreepathError):
     """An argument of the command line that cannot be used."""
 
 
+def expect(name: str, holds: bool, what: str, got: Any) -> None:
+    """Raise UsageError, with the name of an argument, where it is not what was expected."""
+    if not holds:
+        raise UsageError(f"{name}: expected {what}, got {got!r}")
+
+
 class CatalogError(FreepathError):
     """A kernel file whose front matter cannot be used."""
 

@@ -10,7 +10,9 @@ parameters:
     default: midpoint
     meaning: where in its step the extinction is looked up; comb is one random place for all steps of a ray
 state: {taken: real, offset: real}
-citation: Perlin, Hoffert 1989, Hypertexture; Novak, Georgiev, Hanika, Jarosz 2018, section 4.1
+citation: >-
+  Perlin, Hoffert 1989, Hypertexture; Novak, Georgiev, Hanika, Jarosz 2018, Monte Carlo methods for volumetric
+  light transport simulation (section 4.1)
 ---*/
 /* Constant steps, each taken as homogeneous with the extinction of one point in it; the distance within
    the last step is analytic. Biased: the error falls with the step, in first order for its start, in

@@ -6,7 +6,8 @@ bounding: true
 state: {total: real}
 citation: >-
   Cramer 1978, Application of the fictitious scattering model for deep-penetration Monte Carlo
-  calculations; Novak, Georgiev, Hanika, Jarosz 2018, section 4.2
+  calculations; Novak, Georgiev, Hanika, Jarosz 2018, Monte Carlo methods for volumetric
+  light transport simulation (section 4.2)
 ---*/
 /* Next-flight ratio tracking with the null probability played instead of multiplied: a real collision ends
    the flight, so that what is behind it costs no lookups. */

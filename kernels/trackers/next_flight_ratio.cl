@@ -5,7 +5,8 @@ needs: [majorant]
 state: {survival: real, total: real}
 citation: >-
   Cramer 1978, Application of the fictitious scattering model for deep-penetration Monte Carlo
-  calculations; Novak, Georgiev, Hanika, Jarosz 2018, section 4.2
+  calculations; Novak, Georgiev, Hanika, Jarosz 2018, Monte Carlo methods for volumetric
+  light transport simulation (section 4.2)
 ---*/
 /* At the start and after every null collision the chance of flying out without another tentative collision,
    exp(-majorant depth ahead), is scored; the flight itself only finds the collisions. */

@@ -11,7 +11,7 @@ parameters:
 state: {total: real, term: real, log_mass: real, summed: real}
 citation: >-
   Georgiev, Misso, Hachisuka, Nowrouzezahrai, Krivanek, Jarosz 2019, Integral formulations of volumetric
-  transmittance, section 5
+  transmittance (section 5)
 ---*/
 /* T = sum over k of p_k E[w_1 ... w_k], with the Poisson probabilities p_k of the majorant's optical depth and
    w = 1 - sigma_t / majorant at random points, uniform in that depth. The same points serve all terms, so the

@@ -11,7 +11,7 @@ parameters:
       how a tentative collision is classified: in proportion to the largest or the average coefficient of all
       channels, or the same of the coefficients times the channels' weights so far
 citation: >-
-  Kutz, Habel, Li, Novak 2017, Spectral and decomposition tracking for rendering heterogeneous volumes, section 5
+  Kutz, Habel, Li, Novak 2017, Spectral and decomposition tracking for rendering heterogeneous volumes (section 5)
 ---*/
 /* One path for all channels. An event has one probability for all, and each channel's weight makes good for it:
    (coefficient / majorant) / probability. */

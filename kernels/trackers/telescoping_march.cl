@@ -20,8 +20,8 @@ state:
   aside: mask
   depth_aside: real
 citation: >-
-  Misso, Bitterli, Georgiev, Jarosz 2022, Unbiased and consistent rendering using biased estimators, with the
-  antithetic differences of Giles, Szpruch 2014, Antithetic multilevel Monte Carlo estimation
+  Misso, Bitterli, Georgiev, Jarosz 2022, Unbiased and consistent rendering using biased estimators; Giles, Szpruch
+  2014, Antithetic multilevel Monte Carlo estimation (of the antithetic differences)
 ---*/
 /* T = I_0 + (I_(j+1) - I_j) / p_j, a telescoping sum of which one random term is taken: I_j marches through
    steps x 2^j jittered intervals. One march serves both parts of a difference: of each two of its intervals a

@@ -6,7 +6,8 @@ bounding: true
 state: {absorbed: real}
 citation: >-
   Spanier 1966, Two pairs of families of estimators for transport problems; Novak, Georgiev, Hanika,
-  Jarosz 2018, section 4.2; the derivation is in docs/estimators.md
+  Jarosz 2018, Monte Carlo methods for volumetric light transport simulation (section 4.2); the derivation
+  is in docs/estimators.md
 ---*/
 /* The light that is lost is the expected optical depth of the track to the first collision,
    E[tau(min(X, L))] = 1 - T. Delta tracking ends the track; the depth of each of its segments is estimated

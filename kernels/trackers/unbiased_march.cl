@@ -11,8 +11,8 @@ state:
   offset: real
   estimates: real[16]
 citation: >-
-  Kettunen, d'Eon, Pantaleoni, Novak 2021, An unbiased ray-marching transmittance estimator, algorithm 1
-  (without endpoint matching)
+  Kettunen, d'Eon, Pantaleoni, Novak 2021, An unbiased ray-marching transmittance estimator
+  (algorithm 1, without endpoint matching)
 ---*/
 /* Optical depths X_i, each marched with a comb of equal steps at a random offset, enter a power series of
    exp(-X) about each of them in turn. Its order N is drawn by Bhanot-Kennedy roulette: p_k, the chance that

@@ -12,8 +12,8 @@ parameters:
       and the highest, the mean, or 1
   share: {default: 1, minimum: 0, host: true, meaning: the control over that}
 citation: >-
-  Kutz, Habel, Li, Novak 2017, Spectral and decomposition tracking for rendering heterogeneous volumes,
-  section 3.3
+  Kutz, Habel, Li, Novak 2017, Spectral and decomposition tracking for rendering heterogeneous volumes
+  (section 3.3)
 ---*/
 /* Any control: where it exceeds the extinction the residual is negative, and so is the weight of a collision
    with it. Real and null collisions are chosen in proportion to |residual| and |null|. */

@@ -6,6 +6,7 @@ import re
 
 import pytest
 
+import freepath
 from freepath.checks import registry
 from freepath.checks.model import LEVEL
 from freepath.checks.outcome import Outcome
@@ -235,7 +236,7 @@ def test_a_path_that_ends_in_begin_is_refused_by_name(call, file, ending):
     assert not (file.parent / "out").exists()
 
 
-def test_findings_are_kept_when_it_is_interrupted(call, file, monkeypatch):
+def test_findings_are_kept_when_it_is_interrupted(call, file, selector, monkeypatch):
     def ended(session, info):
         check = session.chosen[0][1]
         session.outcomes[info.label] = [Outcome(1, check.name, (), "Failed", 1.0, "told", 0, None)]
@@ -248,8 +249,9 @@ def test_findings_are_kept_when_it_is_interrupted(call, file, monkeypatch):
     assert "interrupted; 2 checks were run" in text
     assert "wrong: 2 of 2 checks failed" in text
     assert len(json.loads((file.parent / "out" / "checks.json").read_text())) == 2
-    code, text = call(file, "-o", "out")  # its own folder is made anew
-    assert code == 130, text
+    trial = freepath.try_tracker(file, output="out", devices=selector)  # its folder is made anew
+    assert (trial.interrupted, trial.right, trial.result) == (True, False, None)
+    assert (str(trial) + "\n", len(trial.outcomes)) == (text, 2)
 
 
 def test_a_new_tracker_begins_as_its_parent(work, capsys):

@@ -11,61 +11,16 @@ from junitparser import JUnitXml
 from scipy import stats
 
 from freepath.cli import main
-from freepath.results.folder import COLUMNS, SAMPLE_COLUMNS
 from freepath.show import compare
 from freepath.show.compare.pairing import Run, Side
 from support import trials
+from support.runs import ROUNDS, modelled, row_of, write
 
 RERUNS = Path(__file__).parents[1] / "data" / "reruns.npz"
 """Seconds a sample of every round of 54 reruns of 16 cases, on two cores with a load of 1 to 14."""
-ROUNDS = 100
 SETTINGS = compare.Settings()
 TELLING = compare.Settings(factor=1.05, drift=2.0)
 """With these a run of 100 rounds of the model can show that nothing changed."""
-
-
-def row_of(name, **changes):
-    row = dict.fromkeys(COLUMNS, "") | {
-        "schema_version": "6",
-        "run_id": "r",
-        "case_id": name,
-        "case": f"transmittance/m/{name}/auto/strict",
-        "status": "ok",
-        "device": "d",
-        "platform": "p",
-        "driver_version": "1",
-        "medium": "m",
-        "rays": "64",
-        "seed": "1",
-        "lanes": "16",
-        "arithmetic": "strict",
-        "samples_per_ray": "100",
-        "counted_samples": "6400",
-        "lookups_per_sample": "3.5",
-        "timing_source": "device",
-        "estimate": "0.5",
-        "reference": "0.5",
-        "bias_stderr": "0.0005",
-        "variance": "0.25",
-        "time_per_sample_s": "1e-06",
-        "lane_occupancy": "0.9",
-        "majorant": "none",
-    }
-    return row | changes
-
-
-def modelled(random, cases=8, rounds=ROUNDS, noise=0.01):
-    """A run: a level of its own, a drift that lasts, and noise with rare high values."""
-    drift = 0.1 * random.normal() + np.cumsum(0.02 * random.normal(size=rounds))
-    run = Run({}, {}, {}, {})
-    for i in range(cases):
-        key = (f"c{i}", "d", "p")
-        run.rows[key] = row_of(f"c{i}")
-        rare = 0.2 * random.exponential(size=rounds) * (random.random(rounds) < 0.05)
-        times = 1e-6 * (1 + i) * np.exp(drift + noise * random.normal(size=rounds) + rare)
-        run.times[key] = dict(enumerate(times.tolist()))
-        run.variances[key] = (0.25 + 0.01 * random.normal(size=rounds)).tolist()
-    return run
 
 
 def real():
@@ -143,6 +98,20 @@ def test_verdicts(changes, verdict):
     }
 
 
+def test_code_that_draws_other_numbers_is_compared_by_z():
+    """0.0001 is 0.14 standard errors: another estimate of the same samples, or chance."""
+    for same, estimate, verdict in (
+        (True, "0.5001", "DIFFERENT"),
+        (False, "0.5001", "SAME"),
+        (False, "0.51", "DIFFERENT"),
+    ):
+        random = np.random.default_rng(1)
+        (before, key), (after, _) = side(random), side(random, estimate=estimate)
+        settings = compare.Settings(factor=1.05, drift=2.0, same_samples=same)
+        judged, _ = compare.compare(before, after, settings)
+        assert {one.key: one.verdict for one in judged}[key] == verdict
+
+
 @pytest.mark.parametrize(("estimate", "verdict"), [("0.5001", "SAME"), ("0.51", "DIFFERENT")])
 def test_cases_without_an_exact_value_are_compared(estimate, verdict):
     random = np.random.default_rng(1)
@@ -186,27 +155,6 @@ def test_a_slowdown_of_all_cases_takes_several_runs(runs):
             trials.slowed(contender, key, 2.0)
         judged, _ = compare.compare(reference, contender, SETTINGS)
         assert {one.verdict for one in judged} == expected
-
-
-def write(folder, run, *, names=None, processor="x"):
-    folder.mkdir(parents=True)
-    names = names or list(run.rows)
-    with (folder / "summary.csv").open("w") as file:
-        writer = csv.DictWriter(file, COLUMNS)
-        writer.writeheader()
-        writer.writerows(run.rows[name] for name in names)
-    with (folder / "samples.csv").open("w") as file:
-        writer = csv.DictWriter(file, SAMPLE_COLUMNS)
-        writer.writeheader()
-        for key in names:
-            for number, seconds in run.times[key].items():
-                values = {"case_id": key[0], "device": "d", "platform": "p", "round": number}
-                values |= {"samples": 1000, "time_device_s": 1000 * seconds, "variance": 0.25}
-                values["time_wall_s"] = values["time_device_s"]
-                writer.writerow(dict.fromkeys(SAMPLE_COLUMNS, "") | values)
-    host = {"processor": processor, "cores": 2, "system": "s"}
-    (folder / "run.json").write_text(json.dumps({"sessions": [{"host": host}]}))
-    return folder
 
 
 def test_the_command(tmp_path, runs, capsys):
@@ -362,6 +310,22 @@ def test_without_rounds_nothing_is_the_same(runs):
     assert {(one.verdict, one.why) for one in judged} == {
         ("UNDECIDED", "no rounds to compare times by")
     }
+
+
+def test_a_result_whose_rounds_were_cut_is_refused(tmp_path, capsys):
+    """84 rounds as the summary has it, of which 2 are left."""
+    run = modelled(np.random.default_rng(1), rounds=84)
+    for row in run.rows.values():
+        row |= {"rounds": "84", "samples_per_ray": "1000", "rays": "84", "run_id": ""}
+    folder = write(tmp_path / "a", run)
+    assert main(["compare", str(folder), str(folder), "--drift", "2"]) == 0
+    lines = (folder / "samples.csv").read_text().splitlines(keepends=True)
+    kept = [line for line in lines[1:] if int(line.split(",")[5]) < 2]
+    (folder / "samples.csv").write_text("".join([lines[0], *kept]))
+    assert main(["compare", str(folder), str(folder)]) == 2
+    told = capsys.readouterr().err
+    assert "a/summary.csv:2: transmittance/m/c0/auto/strict: expected 84 rounds of 84000" in told
+    assert "found 2 of 2000: a file was cut or changed" in told
 
 
 def test_percent_signs_are_taken(tmp_path, runs, capsys):

@@ -3,7 +3,6 @@
 import csv
 import itertools
 import json
-import math
 import shutil
 import time
 
@@ -12,68 +11,12 @@ import pytest
 from freepath.cli import main
 from freepath.errors import FreepathError
 from freepath.measure import pictures
-from freepath.results.folder import COLUMNS, CONFIRM_COLUMNS
-from freepath.show.report import load, write
+from freepath.results.folder import CONFIRM_COLUMNS
+from freepath.show.report import Choice, load, write
 from freepath.show.report.pictures import picture
 from freepath.show.report.text import markdown, sentences
 from support.many import many
-
-EVIL = "</script><script>alert(1)</script><b>`|"
-ROW = dict.fromkeys(COLUMNS, "") | {
-    "case_id": "1",
-    "case": "transmittance/cloud-64/global/t1/delta/auto/strict",
-    "status": "ok",
-    "device": "a [b] <c>",
-    "platform": "p",
-    "driver_version": "1",
-    "estimand": "transmittance",
-    "medium": "cloud-64",
-    "majorant": "global",
-    "tightness": "1.0",
-    "tracker": "delta",
-    "tracker_label": "delta",
-    "arithmetic": "strict",
-    "lanes": "16",
-    "rays": "64",
-    "time_per_sample_s": "1e-06",
-    "lookups_per_sample": "5.0",
-    "lane_occupancy": "0.9",
-    "time_noise": "0.02",
-    "variance_noise": "0.02",
-    "estimate": "0.5",
-    "reference": "0.5",
-    "variance": "0.25",
-    "bias": "0.0",
-    "bias_stderr": "0.001",
-    "bias_rms": "0.0",
-    "time_to_10pct_s": "0.0001",
-    "time_to_1pct_s": "0.01",
-    "time_to_0.1pct_s": "inf",
-}
-
-
-def row_of(number, tracker, tightness=1.0, seconds=1e-6, **changes):
-    case = f"transmittance/cloud-64/global/t{tightness:g}/{tracker}/auto/strict"
-    row = ROW | {"case_id": str(number), "case": case, "tracker": tracker, "tracker_label": tracker}
-    row |= {"tightness": str(tightness), "time_per_sample_s": str(seconds)}
-    return row | {"time_to_1pct_s": str(1e4 * seconds)} | changes
-
-
-def result_of(folder, rows, confirmed=()):
-    folder.mkdir(exist_ok=True)
-    for name, columns, found in (
-        ("summary.csv", COLUMNS, rows),
-        ("confirm.csv", CONFIRM_COLUMNS, confirmed),
-    ):
-        if found:
-            with (folder / name).open("w", newline="") as file:
-                writer = csv.DictWriter(file, columns)
-                writer.writeheader()
-                writer.writerows(found)
-    host = {"processor": EVIL, "load_at_start": 1.5}
-    (folder / "run.json").write_text(json.dumps({"sessions": [{"host": host}]}))
-    return folder
-
+from support.rows import EVIL, ROW, result_of, row_of
 
 CONFIRMED = dict.fromkeys(CONFIRM_COLUMNS, "") | {
     "case_id": "0",
@@ -150,7 +93,7 @@ def test_devices_differ_in_their_lines(tmp_path, chart):
     assert len(set(cut.values())) == 2
     assert all(len(shown) < 50 for shown in cut.values())
     svg = tmp_path / "p.svg"
-    write([tmp_path / "two"], svg, None, chart)
+    write([tmp_path / "two"], svg, None, Choice(chart))
     assert all(shown in svg.read_text() for shown in cut.values())
     # a single device leaves the dashes to the majorants, and needs no legend
     alone = load([result_of(tmp_path / "one", [r for r in rows if r["driver_version"][2] == "0"])])
@@ -242,7 +185,7 @@ def test_markdown_and_what_is_asked_for_is_printed(result, capfdbinary):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["-o", "p.pdf"], "expected a name that ends in one of .html, .md, .svg, .png"),
+        (["-o", "p.eps"], "expected a name that ends in one of .html, .md, .svg, .png"),
         (["--format", "md", "-o", "p.svg"], "--format md does not fit p.svg"),
         (["--chart", "pareta", "-o", "p.svg"], "did you mean 'pareto'?"),
         (["-o", "none/p.html"], "cannot write none/p.html: No such file or directory"),
@@ -565,34 +508,3 @@ def test_ten_thousand_rows(work, selector, browser):
     assert complaints == []
     assert took["build"] < 5 * SLACK / 2
     assert max(took["open"], took["sort"], took["filter"]) < 2 * SLACK
-
-
-def test_a_table_for_notebooks(result):
-    import freepath
-
-    table = freepath.load(result)
-    rows = table if isinstance(table, list) else table.to_dict("records")
-    assert len(rows) == 13
-    assert rows[0]["variance"] == 0.25
-    assert math.isinf(rows[0]["time_to_0.1pct_s"])
-    with pytest.raises(Exception, match="expected the folder of a run"):
-        freepath.load(result / "none")
-
-
-def test_a_run_from_python(work, selector):
-    import freepath
-    from freepath.errors import ConfigError
-
-    (work / "x.yaml").write_text(
-        "name: x\nrays: {orthographic: {resolution: [4, 4]}}\n"
-        "matrix: {medium: {homogeneous: {sigma_t: 1}}, tracker: delta}\nstop: {samples: 50}\n"
-    )
-    told = []
-    table = freepath.run(
-        "x.yaml", "out", devices=[selector], progress=lambda *what: told.append(what)
-    )
-    assert len(table) == 1
-    assert told
-    with pytest.raises(ConfigError, match=r"x.yaml:3"):
-        (work / "x.yaml").write_text("name: x\nrays: {orthographic: {}}\nmatrox: {}\n")
-        freepath.run("x.yaml", "out2")

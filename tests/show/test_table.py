@@ -167,6 +167,8 @@ def test_the_soonest_is_marked():
 def test_what_is_not_significantly_later_is_marked_too():
     assert best(times("0.00101", "0.001", "0.00105")) == ["0", "1"]
     assert best(times("0.00101", "0.001", "0.00105", noise="0.1")) == ["0", "1", "2"]
+    # an interval that holds 0 says nothing: no star on 37 ms, and none on 605 s
+    assert best(times("0.037", "605", noise="1.43")) == []
     # without a noise nothing is known, and then nothing is the best
     assert best(times("0.0015", "0.001", noise="")) == []
 

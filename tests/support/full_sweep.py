@@ -10,12 +10,13 @@ import math
 from pathlib import Path
 
 from freepath import api
-from freepath.commands.common import volume_of
-from freepath.commands.recommend import told_of
 from freepath.compose import catalog
-from freepath.device.selection import one_device
+from freepath.device.selection import first
 from freepath.extras import recommend
+from freepath.extras.given import volume_of
+from freepath.measure import worker
 from freepath.measure.sweep import Clock, Listener
+from freepath.show.answers import at_accuracy
 from freepath.show.table import seconds
 
 
@@ -24,7 +25,7 @@ def search_of(options: argparse.Namespace) -> recommend.Search:
     options.output.mkdir(parents=True, exist_ok=True)
     return recommend.Search(
         catalog.load(),
-        one_device([options.device] if options.device else []),
+        first([options.device] if options.device else []),
         options.output,
         {"volume": volume_of(options.volume, options.sigma_t)[1]},
         options.estimand,
@@ -51,14 +52,12 @@ def full_sweep(search: recommend.Search, at_most_s: float) -> dict[str, tuple[fl
     stop = recommend.PRECISION[-1] | {"at_most": f"{at_most_s:g} s"}
     path = search.folder / "full.yaml"
     path.write_text(search.config_text(every(search), stop), "utf-8")
-    devices = [search.device]
-    clock = search.clock
-    name = path.with_suffix("")
-    sweep = api.sweep(path, name, known=search.known, devices=devices, clock=clock)
-    sweep.run()
-    rows = sweep.folder.rows()
-    never = math.inf, 0.0
-    return {r["case"]: recommend.needed(r, search.accuracy) or never for r in rows}
+    sweep = api.sweep(path, path.with_suffix(""), known=search.known, clock=search.clock)
+    worker.run(sweep, search.part)
+    found = {row["case"]: at_accuracy(row, search.accuracy) for row in sweep.folder.rows()}
+    return {
+        name: (one.time_s, one.noise) if one else (math.inf, 0.0) for name, one in found.items()
+    }
 
 
 def arguments() -> argparse.Namespace:
@@ -80,20 +79,20 @@ def main() -> None:
     options = arguments()
     search = search_of(options)
     finalists = search.run()
-    first = (search.clock.outside_s, search.clock.build_s)
-    print(f"{options.volume.name}, {options.estimand}, {search.device.info.label}")
-    print("\n".join(told_of([one.case for one in finalists])))
+    took = (search.clock.outside_s, search.clock.build_s)
+    print(f"{options.volume.name}, {options.estimand}, {search.part.infos[0].label}")
+    print("\n".join(recommend.told_of(finalists, search.side)))
     times = full_sweep(search, options.seconds)
-    outside, build = search.clock.outside_s - first[0], search.clock.build_s - first[1]
+    outside, build = search.clock.outside_s - took[0], search.clock.build_s - took[1]
     print(f"\nfull sweep of {len(times)} cases, the fastest:")
     for name, (time_s, noise) in sorted(times.items(), key=lambda one: one[1][0])[:5]:
         print(f"  {name}  {seconds(time_s)} +- {100 * noise:.1f} %")
     ratio = times[finalists[0].case.case][0] / min(time_s for time_s, _ in times.values())
     print(f"recommended / fastest of the sweep: {ratio:.3f}")
     print(
-        f"took {first[0]:.0f} s and {first[1]:.0f} s of compilation; the sweep {outside:.0f} s and "
-        f"{build:.0f} s: {first[0] / outside:.3f} of its time, with compilation "
-        f"{sum(first) / (outside + build):.3f}"
+        f"took {took[0]:.0f} s and {took[1]:.0f} s of compilation; the sweep {outside:.0f} s and "
+        f"{build:.0f} s: {took[0] / outside:.3f} of its time, with compilation "
+        f"{sum(took) / (outside + build):.3f}"
     )
 
 

@@ -42,10 +42,11 @@ def add_device(command: Any, what: str) -> None:
     )
 
 
-def add_output(command: Any, what: str, name: str) -> None:
+def add_output(command: Any, what: str, name: str, into: str = "output") -> None:
     """-o, the folder."""
     told = f"folder for {what} (default: results/{name}-TIME)"
-    action = command.add_argument("-o", "--output", type=Path, metavar="DIR", help=told)
+    named = {"type": Path, "metavar": "DIR", "help": told, "dest": into}
+    action = command.add_argument("-o", "--output", **named)
     action.complete = shtab.DIRECTORY
 
 

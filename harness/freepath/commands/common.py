@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 import sys
 from argparse import Namespace
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from freepath.errors import printable
@@ -20,10 +18,6 @@ if TYPE_CHECKING:
     from freepath.cases.plan import Case
     from freepath.compose.catalog import Catalog
     from freepath.config import Config
-    from freepath.scene.volumes.reading import Volume
-
-Keys = dict[str, Any]
-"""Of a volume, in a config."""
 
 
 def cases_of(options: Namespace) -> tuple[Config, Catalog, list[Case]]:
@@ -37,48 +31,6 @@ def cases_of(options: Namespace) -> tuple[Config, Catalog, list[Case]]:
     loaded = config.load(path, known.parameter_models(), options.axis)
     cases = plan.select(plan.expand(loaded, known), options.include, options.exclude)
     return loaded, known, cases
-
-
-def volume_of(file: Path, sigma_t: float | None, **how: str | None) -> tuple[Volume, Keys]:
-    """A volume of the command line, and the keys by which a config names it.
-
-    It is found where `run` finds those of a config; `how` are its `grid` and `raw`. Raises
-    VolumeError where it is none.
-    """
-    from freepath.errors import VolumeError
-    from freepath.scene.volumes.files import find_file
-    from freepath.scene.volumes.reading import read_volume
-
-    file = find_file(file.absolute() if os.path.lexists(file) else file)
-    if not str(file).isprintable():
-        raise VolumeError(f"{ascii(str(file))}: expected a name of characters that can be printed")
-    volume = read_volume(file, **how)
-    if not volume.densities.any():
-        raise VolumeError(f"{file}: is empty: expected a density above 0 in a voxel at least")
-    named = {name: value for name, value in how.items() if value is not None}
-    return volume, {"file": str(file.resolve()), "sigma_t": sigma_t or 1.0, **named}
-
-
-MARK = ".freepath-made"
-
-
-def own_folder(folder: Path, command: str) -> None:
-    """Make a folder, or empty one that the same command made; raises UsageError for any other."""
-    from freepath.errors import UsageError
-    from freepath.results.folder import write
-
-    mark = folder / MARK
-    try:
-        held = sorted(folder.iterdir()) if folder.exists() else []
-        if held and not (mark.is_file() and mark.read_text("utf-8") == command):
-            what = f"or made by `freepath {command}`"
-            raise UsageError(f"{folder}: expected a folder that is empty, not there yet, {what}")
-        for one in held:
-            shutil.rmtree(one) if one.is_dir() and not one.is_symlink() else one.unlink()
-        folder.mkdir(parents=True, exist_ok=True)
-        write(mark, command)
-    except OSError as error:
-        raise UsageError(f"{folder}: cannot be a folder for results: {error.strerror}") from error
 
 
 def print_records(records: list[dict[str, Any]], *, as_json: bool) -> int:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from argparse import ArgumentTypeError, Namespace
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import shtab
 
 from freepath.commands.arguments import number_or_percent
+
+if TYPE_CHECKING:
+    from freepath.show.compare import Comparison, Side
 
 REGRESSION = 1
 FORMATS = ("text", "csv", "html", "json", "md")
@@ -34,13 +38,21 @@ def add(commands: Any) -> None:
         "contender", type=Path, nargs="+", metavar="CONTENDER", help="what to judge; may be several"
     ).complete = shtab.DIRECTORY
     compare.add_argument(
+        "-o", "--output", type=Path, metavar="FILE", help="a .csv, .html, .json or .md to write"
+    ).complete = shtab.FILE
+    add_judging(compare)
+
+
+def add_judging(command: Any) -> None:
+    """What is said of two sides, and how."""
+    command.add_argument(
         "--alpha",
         type=_share,
         default=0.05,
         metavar="A",
         help="expected share of false findings among the findings (default: 0.05)",
     )
-    compare.add_argument(
+    command.add_argument(
         "--factor",
         type=_ratio,
         default=1.01,
@@ -48,7 +60,7 @@ def add(commands: Any) -> None:
         help="ratio of times, variances or estimates that is too small to matter, as 1.05 or 5%% "
         "(default: 1.01)",
     )
-    compare.add_argument(
+    command.add_argument(
         "--drift",
         type=_ratio,
         metavar="F",
@@ -56,14 +68,14 @@ def add(commands: Any) -> None:
         "a reason, to be taken out of each case (default: all of it, unless several runs on either "
         "side show that it is no drift)",
     )
-    compare.add_argument("--no-times", action="store_true", help="do not compare times")
-    compare.add_argument("--all", action="store_true", help="print the cases that did not change")
-    compare.add_argument(
+    command.add_argument("--no-times", action="store_true", help="do not compare times")
+    command.add_argument("--all", action="store_true", help="print the cases that did not change")
+    command.add_argument(
         "--other-machine",
         action="store_true",
         help="compare results of different machines nevertheless",
     )
-    compare.add_argument(
+    command.add_argument(
         "--fail-on",
         type=_words,
         default=("SLOWER", "MORE_NOISE", "DIFFERENT", "MISSING"),
@@ -71,19 +83,16 @@ def add(commands: Any) -> None:
         help="verdicts that make exit code 1, e.g. SLOWER,UNDECIDED, or none (default: "
         "SLOWER,MORE_NOISE,DIFFERENT,MISSING)",
     )
-    compare.add_argument("--format", choices=FORMATS, help="what to write")
+    command.add_argument("--format", choices=FORMATS, help="what to write")
     for name in ("json", "md"):
-        compare.add_argument(
+        command.add_argument(
             f"--{name}",
             action="store_const",
             dest="format",
             const=name,
             help=f"the same as --format {name}",
         )
-    compare.add_argument(
-        "-o", "--output", type=Path, metavar="FILE", help="a .csv, .html, .json or .md to write"
-    ).complete = shtab.FILE
-    compare.add_argument(
+    command.add_argument(
         "--output-junit", type=Path, metavar="FILE", help="write verdicts as JUnit XML"
     ).complete = shtab.FILE
 
@@ -117,27 +126,25 @@ def _words(text: str) -> tuple[str, ...]:
 
 def execute(options: Namespace) -> int:
     """Run it; returns the exit code."""
-    from freepath.errors import FreepathError
+    from freepath.show import compare
+
+    reference = compare.load(options.reference)
+    return judge(options, reference, [compare.load(path) for path in options.contender])
+
+
+def judge(
+    options: Namespace, reference: Side, sides: Sequence[Side], *, same_samples: bool = True
+) -> int:
+    """Compare sides with a reference and show that; returns the exit code."""
     from freepath.show import compare
 
     wanted = _format(options)
-    reference = compare.load(options.reference)
-    sides = [compare.load(path) for path in options.contender]
-    for side in sides:
-        reason = compare.unpaired(reference, side)
-        if reason:
-            raise FreepathError(f"{reference.name} and {side.name}: {reason}")
-        reason = "" if options.other_machine else compare.refuse(reference, side)
-        if reason:
-            raise FreepathError(
-                f"{reference.name} and {side.name}: {reason}; --other-machine compares them anyway"
-            )
     settings = compare.Settings(
-        options.alpha, options.factor, options.drift, times=not options.no_times
+        options.alpha, options.factor, options.drift, not options.no_times, same_samples
     )
-    found = [compare.compare(reference, side, settings) for side in sides]
-    _write(options, wanted, reference, sides, (found, settings.to_show))
-    words = {one.verdict for judged, _ in found for one in judged}
+    found = [compare.comparison(reference, s, settings, options.other_machine) for s in sides]
+    _write(options, wanted, found)
+    words = {word for one in found for word in one.verdicts}
     return REGRESSION if words & set(options.fail_on) else 0
 
 
@@ -153,19 +160,17 @@ def _format(options: Namespace) -> str:
     return wanted
 
 
-def _write(
-    options: Namespace, wanted: str, reference: Any, sides: list, told: tuple[list, float]
-) -> None:
+def _write(options: Namespace, wanted: str, found: Sequence[Comparison]) -> None:
     from freepath.errors import FreepathError
     from freepath.show.compare import showing
 
-    found, to_show = told
-    names, results = [side.name for side in sides], [judged for judged, _ in found]
+    reference, to_show = found[0].reference.name, found[0].settings.to_show
+    names, results = [one.contender.name for one in found], [one.judged for one in found]
     made = {
         "csv": lambda: showing.as_csv(names, results),
-        "html": lambda: showing.as_html(reference.name, names, results),
+        "html": lambda: showing.as_html(reference, names, results),
         "json": lambda: showing.as_json(names, results),
-        "md": lambda: showing.as_markdown(reference.name, names, results, to_show),
+        "md": lambda: showing.as_markdown(reference, names, results, to_show),
     }
     path = options.output_junit
     try:
@@ -178,20 +183,12 @@ def _write(
         raise FreepathError(f"cannot write {path}: {error.strerror}") from error
     if wanted != "text" and not options.output:
         print(made[wanted](), end="")
-    else:
-        _print(options, names, found, to_show)
+        return
+    if len(found) > 1:
+        from freepath.commands.common import console_of
 
-
-def _print(options: Namespace, names: list[str], found: list, to_show: float) -> None:
-    from freepath.commands.common import console_of
-    from freepath.show.compare import showing
-
-    if len(names) > 1:
-        console_of().print(showing.matrix_table(names, [judged for judged, _ in found]))
-    for name, (judged, shifts) in zip(names, found, strict=True):
-        lines = showing.lines(judged, everything=options.all) if len(names) == 1 else []
-        lines += showing.shift_lines(shifts)
-        lines += [f"{name}: {showing.totals(judged)}", showing.undecided(judged, to_show)]
-        print("\n".join(filter(None, lines)))
+        console_of().print(showing.matrix_table(names, results))
+    for one in found:
+        print("\n".join(one.lines(everything=options.all, cases=len(found) == 1)))
     if options.output:
         print(f"wrote {options.output}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 from argparse import Namespace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from freepath.commands.arguments import (
     add_baseline,
@@ -19,13 +19,6 @@ from freepath.commands.arguments import (
     positive,
 )
 from freepath.errors import INTERRUPTED
-
-if TYPE_CHECKING:
-    from freepath.extras.recommend import Finding, Search
-    from freepath.extras.renderers import Renderer
-
-
-DEFAULT = "sigma_t is the default, 1: another may have another fastest; give yours by --sigma-t"
 
 
 def add(commands: Any) -> None:
@@ -93,106 +86,16 @@ def _accuracy(text: str) -> float:
 
 def execute(options: Namespace) -> int:
     """Run it; returns the exit code."""
-    from freepath.commands.common import console_of, own_folder, volume_of
+    from freepath.commands.common import console_of
     from freepath.commands.run import _shown_progress
-    from freepath.compose import catalog
-    from freepath.device.selection import first
-    from freepath.errors import RunError
-    from freepath.extras.recommend import OVER, Search
-    from freepath.extras.renderers import RENDERERS
-    from freepath.measure.sweep import Clock
-    from freepath.results.folder import new_folder
-    from freepath.show import answers
+    from freepath.extras.recommend import recommend
 
-    clock = Clock()
-    _, keys = volume_of(options.volume, options.sigma_t, grid=options.grid, raw=options.raw)
-    medium = {"volume": keys}
-    known = catalog.load(options.trackers)
-    part = first(options.device)
-    folder = options.output or new_folder(f"recommend-{options.volume.stem[:60]}")
-    own_folder(folder, "recommend")
     console = console_of()
-
-    def say(*lines: str) -> None:
-        for line in filter(None, lines):
-            console.print(line, highlight=False, markup=False, soft_wrap=True)
-
-    asked = (medium, options.estimand, options.accuracy, options.budget)
-    interrupted = ""
+    asked = ("volume", "accuracy", "estimand", "renderer", "grid", "budget", "sigma_t", "output")
+    asked += ("include", "baseline", "trackers", "raw")
     with _shown_progress(console, rows=False) as listener:
-        renderer = RENDERERS.get(options.renderer)
-        more = options.include, renderer, options.timeout
-        search = Search(known, part, folder, *asked, listener, clock, *more)
-        try:
-            search.run()
-        except KeyboardInterrupt:
-            interrupted = "interrupted; what is known so far:"
-        finally:
-            search.keep()
-    say(
-        interrupted,
-        f"{options.volume.name}, {options.estimand} to {100 * options.accuracy:g} %, on "
-        f"{part.infos[0].label}",
-        search.dense,
-        DEFAULT if options.sigma_t is None else "",
-    )
-    try:
-        finalists = search.finalists()
-    except RunError as error:
-        if not interrupted:
-            raise
-        say(str(error))
-        return INTERRUPTED
-    mine = [one.case for one in search.found.values() if search.is_had(one)]
-    say(*told_of(finalists, search.side))
-    say(answers.sentence(mine, options.accuracy, options.baseline))
-    say(*(_told_for(renderer, finalists[0], search) if renderer else ()), search.edge)
-    if search.lacks or search.spent_s > OVER * options.budget:
-        lacks = "; ".join(search.lacks) or "no case can be given less than 0.05 s"
-        took = f"{search.spent_s:.1f} s were taken; not measured: {lacks}"
-        say(f"the budget of {options.budget:g} s was too little: {took}")
-    say(
-        f"{search.measured} cases measured in {clock.outside_s:.0f} s, and {clock.build_s:.0f} s "
-        f"of compilation",
-        f"wrote {search.write(finalists)}; to look at all of it: freepath report {folder}",
-    )
-    return INTERRUPTED if interrupted else 0
-
-
-def told_of(finalists: list[Finding], side: float) -> list[str]:
-    """The best, how sure that is, and what the others take; a voxel's side is in the world."""
-    from freepath.show import answers
-    from freepath.show.table import seconds
-
-    best, *others = (one.case for one in finalists)
-    low, high = (best.time_s * max(0.0, 1 + sign * best.noise) for sign in (-1, 1))
-    lines = [
-        f"fastest: {best.case}",
-        f"  {seconds(best.time_s)} of device time per ray "
-        f"(95 %: {seconds(low)} to {seconds(high)})",
-    ]
-    if step := next(iter(finalists[0].axes["tracker"].values())).get("step"):
-        lines.append(f"  its step: {step / side:.3g} x a voxel, {step:.4g} in units of the scene")
-    for place, one in enumerate(others):
-        what = "second" if place == 0 else "then"
-        middle, low, high = map(answers.digits, answers.ratio(one, best))
-        times = f"{middle} ({low} to {high}) times as long" if one.settled else "not known"
-        lines += [f"{what}: {one.case}", f"  {seconds(one.time_s)}, {times}"]
-    return lines
-
-
-def _told_for(renderer: Renderer, best: Finding, search: Search) -> list[str]:
-    """What to set in a renderer, how biased that is, and what it costs not to have the rest."""
-    from freepath.show import answers
-
-    bias = f"it is biased by {100 * best.case.bias:.1g} %"
-    known = [one.case for one in search.found.values() if one.case.settled]
-    fastest = min(known, key=lambda one: one.time_s)
-    gain = "nothing that was measured is faster"
-    if fastest is not best.case:
-        gain = f"{fastest.name} would be {answers.times_as_fast(best.case, fastest)}"
-    return [
-        f"in {renderer.title}: {renderer.settings(best.axes, search.side)}",
-        f"  {bias if best.case.biased else 'it has no measurable bias'}; of what it lacks: {gain}",
-        f"  settings from {renderer.source}",
-    ]
+        given = {name: getattr(options, name) for name in asked}
+        more = {"devices": options.device, "timeout_s": options.timeout, "listener": listener}
+        found = recommend(**given, **more)
+    console.print(found, highlight=False, markup=False, soft_wrap=True)
+    return INTERRUPTED if found.interrupted else 0

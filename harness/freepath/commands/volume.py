@@ -52,9 +52,10 @@ def _sides(text: str) -> list[float]:
 
 def execute(options: Namespace) -> int:
     """Run it; returns the exit code."""
-    from freepath.commands.common import console_of, volume_of
+    from freepath.commands.common import console_of
     from freepath.errors import UsageError
     from freepath.extras import contents
+    from freepath.extras.given import volume_of
 
     path = options.output
     if path and path.suffix.lower() != ".png":

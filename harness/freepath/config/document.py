@@ -80,7 +80,7 @@ class Document:
     def problem(self, location: Location, message: str, kind: str = "") -> Problem:
         """Return the problem at a location of the data, with the caret where `kind` wants it."""
         path, index = self._walk(location, kind)
-        if index is None:
+        if index is None or not self.text:  # of a dictionary, which has no lines
             return Problem(self.name, 0, 0, path, message)
         return _problem(self.name, self.text, index, path, message)
 

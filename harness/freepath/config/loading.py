@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import json
 import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -9,7 +11,7 @@ from typing import Any
 
 from freepath.config.axes import TRACKER
 from freepath.config.base import Kind
-from freepath.config.document import Document, Location, validate
+from freepath.config.document import Document, Location, path_text, validate
 from freepath.config.overrides import Override, parse_all
 from freepath.config.sweep import Config
 from freepath.errors import ConfigError, Problem, did_you_mean
@@ -20,18 +22,24 @@ LARGEST_FILE = 1 << 20
 
 
 def load(
-    path: Path | str, trackers: Mapping[str, type[Kind]], overrides: Iterable[str] = ()
+    path: Path | str | Mapping[str, Any],
+    trackers: Mapping[str, type[Kind]],
+    overrides: Iterable[str] = (),
 ) -> Config:
-    """Load a config.
+    """Load a config from a file, or from a dictionary of what a file would hold.
 
     `trackers` are the parameter models of the catalog, by name; `overrides` are texts such as
     "tightness=1,2,4" that replace axes. Raises ConfigError with all problems at once.
     """
     replaced = parse_all(overrides)
-    document = Document.parse(str(path), read_text(path))
+    if isinstance(path, Mapping):
+        text = json.dumps(_plain(path, ()), ensure_ascii=False)
+        document = dataclasses.replace(Document.parse("config", text), text="")
+    else:
+        document = Document.parse(str(path), read_text(path))
     if document.data is None:
         message = "expected a mapping with name and matrix, got an empty file"
-        raise ConfigError([Problem(str(path), 0, 0, "", message)])
+        raise ConfigError([Problem(document.name, 0, 0, "", message)])
 
     def problem(location: Location, message: str, kind: str = "") -> Problem:
         if location[:1] == ("matrix",) and len(location) > 1 and location[1] in replaced:
@@ -42,6 +50,22 @@ def load(
     config = validate(Config, data, problem, {TRACKER: dict(trackers)})
     config.attach(document, frozenset(replaced))
     return config
+
+
+def _plain(value: Any, location: Location) -> Any:
+    """A value as JSON has it: numbers of numpy and paths too; raises ConfigError for others."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(one, (*location, str(key))) for key, one in value.items()}
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, (list, tuple)):
+        return [_plain(one, (*location, place)) for place, one in enumerate(value)]
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    if value is None or isinstance(value, (str, int, float)):
+        return value
+    message = f"expected a text, a number, a list or a dictionary, got {type(value).__name__}"
+    raise ConfigError([Problem("config", 0, 0, path_text(location), message)])
 
 
 def _with_overrides(data: Any, replaced: Mapping[str, Override]) -> Any:

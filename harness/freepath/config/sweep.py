@@ -162,7 +162,7 @@ class Config(Model):
     @property
     def path(self) -> Path | None:
         """The file it was loaded from; None for one made in a program."""
-        return Path(self._document.name) if self._document else None
+        return Path(self._document.name) if self.text else None
 
     @property
     def search_path(self) -> list[Path]:

@@ -3,25 +3,34 @@
 from __future__ import annotations
 
 import json
+import os
 import tempfile
+import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from freepath import api
 from freepath.checks import registry
 from freepath.checks import session as checking
 from freepath.checks.model import Check
-from freepath.checks.outcome import CRASHED, TIMEOUT, Outcome
+from freepath.checks.outcome import CRASHED, SKIPPED, TIMEOUT, Outcome
 from freepath.checks.rig import Rig
 from freepath.checks.suite.common import everyone, homogeneous
 from freepath.checks.verdict import NotApplicable
 from freepath.compose import catalog as catalogs
 from freepath.compose.catalog import Catalog, Tracker
 from freepath.device.opencl import Device, DeviceInfo
-from freepath.errors import CatalogError
-from freepath.results.folder import CHECKS, write
-from freepath.show import answers, table
+from freepath.device.selection import Part, first, one_device
+from freepath.errors import CatalogError, expect
+from freepath.extras.given import own_folder, volume_of
+from freepath.measure import worker
+from freepath.measure.sweep import Listener
+from freepath.results.folder import CHECKS, new_folder, write
+from freepath.show import answers, report, table
+from freepath.show.report.text import sentences
+from freepath.show.result import Result
 from freepath.show.table import Row
 
 RELATIVES = 4
@@ -208,3 +217,152 @@ def _in_words(own: answers.Case | None, other: answers.Case | None) -> str:
     low, high = answers.ratio(other, own)[1:]
     verdict = "faster" if low > 1 else "slower" if high < 1 else "no difference is known"
     return f"{answers.times_as_fast(other, own)}: {verdict}"
+
+
+@dataclass
+class Trial:
+    """A tracker on trial: `check` says whether it is right, `measure` and `compare` where it pays.
+
+    As a text it is what the command line says.
+    """
+
+    known: Catalog
+    tracker: Tracker
+    parent: Tracker
+    part: Part
+    folder: Path
+    """Of its checks, its results and its report."""
+    chosen: list[tuple[int, Check]]
+    compiling_s: float
+    volume: dict[str, Any] | None
+    say: Callable[[str], None]
+    lines: list[str] = field(default_factory=list)
+    outcomes: list[Outcome] = field(default_factory=list)
+    right: bool = False
+    """Whether all checks were run and none failed."""
+    interrupted: bool = False
+    result: Result | None = None
+    """What was measured beside its relatives, once that is done."""
+
+    def tell(self, line: str) -> None:
+        """Say it, and keep it."""
+        self.lines.append(line)
+        self.say(line)
+
+    def check(self, tell: Callable[[str], None] = lambda text: None) -> None:
+        """Run its checks; `tell` is called with how far they are."""
+        processes, file = min(2, os.cpu_count() or 1), self.tracker.path
+        info = self.part.infos[0]
+        self.outcomes, stopped = check(self.chosen, file, info, processes, tell, self.compiling_s)
+        kept = keep(self.outcomes, self.folder)
+        wrong = [one for one in self.outcomes if one.wrong]
+        passed = sum(not one.wrong and one.status != SKIPPED for one in self.outcomes)
+        self.interrupted = stopped == INTERRUPTED
+        self.right = not wrong and not stopped
+        if stopped:
+            self.tell(f"{stopped}; {len(self.outcomes)} checks were run")
+        if not wrong:
+            skipped = len(self.outcomes) - passed
+            beside = f", {skipped} do not apply" if skipped else ""
+            verdict = "none failed so far" if stopped else "right"
+            self.tell(f"{verdict}: {passed} checks passed{beside}")
+            return
+        self.tell(f"wrong: {len(wrong)} of {len(self.outcomes)} checks failed")
+        for one in wrong:
+            text = one.text.strip().splitlines()
+            self.tell(f"  {one.name}\n      {text[-1] if text else one.status}")
+        self.tell(f"wrote {kept}; a wrong tracker is not measured")
+
+    def measure(self, listener: Listener, timeout_s: float | None = None) -> None:
+        """Measure it beside its parent and its relatives."""
+        config = self.folder / CONFIG
+        others = {one.name: one for one in (self.parent, *relatives(self.known, self.tracker))}
+        few = list(others.values())[:RELATIVES]
+        write(config, sweep_text(self.tracker, few, self.volume))
+        sweep = api.sweep(config, self.folder, known=self.known, listener=listener)
+        try:
+            worker.run(sweep, self.part, timeout_s)
+        except KeyboardInterrupt:
+            where = f"its folder is {self.folder}, which `freepath report` shows"
+            self.tell(f"interrupted with {sweep.ended} of {sweep.total} cases; {where}")
+            self.interrupted = True
+            return
+        self.result = api.load(self.folder)
+
+    @property
+    def own_rows(self) -> list[Row]:
+        """The rows of the tracker itself."""
+        return [row for row in self.result.rows if row["tracker"] == self.tracker.name]
+
+    def compare(self) -> None:
+        """Write the report, and say where it pays."""
+        found, page = report.write([self.folder], None, "html")
+        pairs = beside_parent(self.result.rows, self.tracker.name, self.parent.name)
+        for line in (*sentences(found), *pairs, f"wrote {page}"):
+            self.tell(line)
+
+    def __str__(self) -> str:
+        """What the command line says."""
+        return "\n".join(self.lines)
+
+    __repr__ = __str__
+
+
+def prepared(  # noqa: PLR0913 (what the command takes)
+    file: Path,
+    like: str = "",
+    volume: Path | None = None,
+    sigma_t: float | None = None,
+    devices: Sequence[str] = (),
+    output: Path | None = None,
+    *,
+    every: bool = False,
+    say: Callable[[str], None] = lambda line: None,
+) -> Trial:
+    """Read and compile a tracker, and make the folder of its trial.
+
+    Raises CatalogError as `read` does, BuildError with the compiler's log, UsageError for a folder
+    that is neither empty nor of a trial.
+    """
+    known, tracker, parent = read(file, like)
+    named = volume_of(volume, sigma_t)[1] if volume else None
+    folder = output or new_folder(f"try-{tracker.name}")
+    device, part = one_device(devices), first(devices)
+    say(told := f"{tracker.title}, on {device.info.label}")
+    started = time.monotonic()
+    build(device, known, tracker)
+    compiling_s = time.monotonic() - started
+    own_folder(folder, "try")
+    chosen = checks_of(known, tracker, every=every)
+    trial = Trial(known, tracker, parent, part, folder, chosen, compiling_s, named, say, [told])
+    which = "all" if every else "fast"
+    trial.tell(f"{len(chosen)} checks ({which}) that its front matter calls for")
+    return trial
+
+
+def try_tracker(
+    tracker: str | Path,
+    *,
+    devices: str | Sequence[str] = (),
+    every_check: bool = False,
+    checks_only: bool = False,
+    **more: Any,
+) -> Trial:
+    """Check a tracker's file and measure it beside its parent, as `freepath try` does.
+
+    `more` are like, volume, sigma_t and output: docs/try.md. Where a check fails nothing is
+    measured and `right` is False. Raises FreepathError where it cannot be tried.
+    """
+    expect("tracker", isinstance(tracker, (str, Path)), "the path of a .cl file", tracker)
+    for name in more:
+        names = ("like", "volume", "sigma_t", "output")
+        expect("try_tracker", name in names, f"arguments of {', '.join(names)}", name)
+    paths = {name: Path(more[name]) for name in ("volume", "output") if more.get(name)}
+    chosen = api.listed("devices", devices)
+    trial = prepared(Path(tracker), devices=chosen, every=every_check, **more | paths)
+    trial.check()
+    if trial.right and not checks_only:
+        trial.measure(Listener())
+    if trial.result:
+        trial.compare()
+    return trial

@@ -15,19 +15,20 @@ import numpy as np
 
 from freepath import api
 from freepath.cases import plan
+from freepath.compose import catalog
 from freepath.compose.catalog import ANY, Catalog
-from freepath.device.selection import Part
-from freepath.errors import NothingMatchedError, RunError
-from freepath.extras.renderers import RATES, Renderer, contains
+from freepath.device.selection import Part, first
+from freepath.errors import NothingMatchedError, RunError, expect
+from freepath.extras.given import own_folder, volume_of
+from freepath.extras.renderers import RATES, RENDERERS, Renderer, contains
 from freepath.measure import worker
 from freepath.measure.jobs import scenes_of
-from freepath.measure.ladder import Ladder
 from freepath.measure.sweep import Clock, Listener, Sweep
-from freepath.results.folder import RUN, SUMMARY, ResultFolder, Row, read_result, write
+from freepath.results.folder import RUN, SUMMARY, ResultFolder, Row, new_folder, read_result, write
 from freepath.scene import survey
 from freepath.scene.volumes.reading import read_volume
 from freepath.show import answers
-from freepath.show.table import failures, number, uncertainty
+from freepath.show.table import failures, number, seconds, settled, uncertainty
 
 SEED = 7
 RAYS = {"orthographic": {"resolution": [32, 32], "direction": [0.3, 0.2, 1]}}
@@ -52,6 +53,8 @@ OVER = 1.25
 USUAL: dict[str, Any] = {"delta": {}}
 """The tracker that, with one majorant, ratios are of: measured too, where it is searched."""
 CONFIG = "recommended.yaml"
+ESTIMANDS = ("transmittance", "free_path")
+DEFAULT = "sigma_t is the default, 1: another may have another fastest; give yours by --sigma-t"
 Axes = dict[str, Any]
 
 
@@ -62,6 +65,8 @@ class Finding:
     case: answers.Case
     axes: Axes
     """Tracker, majorant and tightness as a config has them."""
+    rough: bool = False
+    """Whether its time alone is not known, as on a busy machine: measured longer it may be."""
 
     @property
     def rank(self) -> tuple[bool, float]:
@@ -70,8 +75,12 @@ class Finding:
 
     @property
     def hope(self) -> tuple[bool, float]:
-        """By the lower end of its interval: what is known roughly is not given up for that."""
-        return not self.case.settled, self.case.time_s * max(0.0, 1.0 - self.case.noise)
+        """By the lower end of its interval: what is known roughly is not given up for that.
+
+        One whose time alone is not known stands by its middle, as its lower end may be 0.
+        """
+        less = self.case.noise if self.case.settled else 0.0
+        return not (self.case.settled or self.rough), self.case.time_s * (1.0 - less)
 
 
 @dataclasses.dataclass
@@ -95,6 +104,7 @@ class Search:
     """A regular expression that names of trackers match."""
     renderer: Renderer | None = None
     """What is recommended is what it has; all the rest is measured for the ratio."""
+    seed: int = SEED
     timeout_s: float | None = None
     """What --timeout takes."""
     measured: int = 0
@@ -142,7 +152,10 @@ class Search:
         mine = sorted(filter(self.is_had, self.found.values()), key=lambda one: one.hope)
         last = [*mine[:FINALISTS], *self._few(FINALISTS if not self.renderer else 2)]
         self._round(3, [one.axes for one in {one.case.case: one for one in last}.values()])
-        self._beyond(majorants)
+        if again := self._in_doubt():
+            self._round(4, [one.axes for one in again[:FINALISTS]])
+        else:
+            self._beyond(majorants)
         return self.finalists()
 
     def is_had(self, one: Finding) -> bool:
@@ -151,7 +164,15 @@ class Search:
 
     def finalists(self) -> list[Finding]:
         """The best that is known of what is had, the fastest first; raises RunError if none is."""
-        mine = sorted(filter(self.is_had, self.found.values()), key=lambda one: one.rank)
+        mine = self._ranked()
+        if doubtful := self._in_doubt():
+            one, best = doubtful[0].case, mine[0].case
+            most = seconds(one.time_s * (1.0 + one.noise))
+            why = f"{one.name} takes {most} at most, {best.name} {seconds(best.time_s)}"
+            why += (
+                f"; but the former is known to {100 * one.noise:.0f} % only, as on a busy machine"
+            )
+            raise RunError(f"the fastest is not known: {why}; give it more time by --budget")
         if not mine or not mine[0].case.settled:
             what = f"that {self.renderer.title} has " if self.renderer else ""
             why = f"nothing {what}is known to reach {100 * self.accuracy:g} %"
@@ -160,6 +181,19 @@ class Search:
                 why += "time by --budget"
             raise RunError(f"{why}; what was measured is in {self.folder}")
         return mine[:FINALISTS]
+
+    def _ranked(self) -> list[Finding]:
+        return sorted(filter(self.is_had, self.found.values()), key=lambda one: one.rank)
+
+    def _in_doubt(self) -> list[Finding]:
+        """What is faster than the best that is known even at the end of its interval."""
+        ranked = self._ranked()
+        found = [
+            one
+            for one in ranked
+            if one.rough and one.case.time_s * (1.0 + one.case.noise) < ranked[0].case.time_s
+        ]
+        return sorted(found, key=lambda one: one.hope)
 
     def _beyond(self, majorants: Sequence[Any]) -> None:
         """Go on once where the fastest lies at the edge of the search."""
@@ -316,13 +350,14 @@ class Search:
 
     def note(self, row: dict[str, str], axes: Axes) -> None:
         """Keep what a row of summary.csv says of a case; what went wrong once is out."""
-        time = needed(row, self.accuracy) if row["status"] == "ok" else None
-        one = answers.case_of(row, time) if time else None
+        one = answers.at_accuracy(row, self.accuracy)
         old = self.found.get(row["case"])
         if one is None:
             self.found.pop(row["case"], None)
         elif one.settled or old is None or not old.case.settled:
-            self.found[row["case"]] = Finding(one, axes)
+            per_sample, noise = number(row, "time_per_sample_s"), number(row, "variance_noise")
+            rough = not one.settled and settled(uncertainty(one.time_s, per_sample, 0.0, noise))
+            self.found[row["case"]] = Finding(one, axes, rough)
 
     def _why_none(self, rows: Sequence[dict[str, str]], folder: Path) -> str:
         failed = failures(rows)
@@ -335,13 +370,27 @@ class Search:
         )
         return "; ".join([why, *told])
 
+    def told(self, finalists: Sequence[Finding], baseline: str) -> list[str]:
+        """The sentence, what a renderer is to be told, and what the search took and lacks."""
+        mine = [one.case for one in self.found.values() if self.is_had(one)]
+        lines = [answers.sentence(mine, self.accuracy, baseline)]
+        if self.renderer:
+            lines += _told_for(self.renderer, finalists[0], self)
+        lines.append(self.edge)
+        if self.lacks or self.spent_s > OVER * self.budget_s:
+            lacks = "; ".join(self.lacks) or "no case can be given less than 0.05 s"
+            took = f"{self.spent_s:.1f} s were taken; not measured: {lacks}"
+            lines.append(f"the budget of {self.budget_s:g} s was too little: {took}")
+        took = f"{self.clock.outside_s:.0f} s, and {self.clock.build_s:.0f} s of compilation"
+        return [*lines, f"{self.measured} cases measured in {took}"]
+
     def config_text(self, points: Sequence[Axes], stop: Axes) -> str:
         """A config of these cases, in YAML (JSON is YAML)."""
         first, *others = (dict(point) for point in points)
         matrix = {"estimand": self.estimand, "medium": [self.medium], **first}
         lines = [
             "name: recommend",
-            f"seed: {SEED}",
+            f"seed: {self.seed}",
             f"rays: {as_yaml(RAYS)}",
             "matrix:",
             *(f"  {axis}: {as_yaml(value)}" for axis, value in matrix.items()),
@@ -365,19 +414,98 @@ def as_yaml(value: Any) -> str:
     return json.dumps(value, ensure_ascii=False)
 
 
-def needed(row: dict[str, str], accuracy: float) -> tuple[float, float] | None:
-    """Device seconds a ray to a relative RMSE, and half their 95 % interval relative to them.
+@dataclasses.dataclass(frozen=True)
+class Recommendation:
+    """What a search has found; as a text it is what the command line says."""
 
-    Infinite where the bias alone is larger. None where the row does not say.
+    folder: Path
+    """Of its results, which `freepath.load` and `freepath report` take."""
+    finalists: list[answers.Case]
+    """The fastest first."""
+    lines: list[str]
+    config: Path | None
+    """What measures the finalists again."""
+    interrupted: bool = False
+    """Whether Ctrl-C ended the search: then this is what was known."""
+
+    @property
+    def best(self) -> answers.Case:
+        """The fastest; raises RunError where the search was interrupted before one was known."""
+        if not self.finalists:
+            raise RunError(str(self))
+        return self.finalists[0]
+
+    def __str__(self) -> str:
+        """What the command line says."""
+        return "\n".join(self.lines)
+
+    __repr__ = __str__
+
+
+def recommend(  # noqa: PLR0913 (what the command takes; all but the volume has a default)
+    volume: str | Path,
+    *,
+    accuracy: float = 0.01,
+    sigma_t: float | None = None,
+    estimand: str = "transmittance",
+    renderer: str | None = None,
+    grid: str | None = None,
+    budget: float = 30.0,
+    output: str | Path | None = None,
+    include: str = "",
+    baseline: str = "",
+    devices: str | Sequence[str] = (),
+    trackers: Sequence[Path] = (),
+    seed: int = SEED,
+    raw: str | None = None,
+    timeout_s: float | None = None,
+    listener: Listener | None = None,
+) -> Recommendation:
+    """Find the tracker and majorant that reach an accuracy first in a volume.
+
+    As `freepath recommend` does (docs/recommend.md): `accuracy` is a relative RMSE, `budget`
+    seconds of measuring, `renderer` what --for takes, `include` a regular expression for names of
+    trackers, `output` a folder that is empty or was made by this. Raises FreepathError with the
+    message that the command line prints, and where nothing is known to reach the accuracy.
     """
-    variance, scale = number(row, "variance"), number(row, "reference")
-    scale = number(row, "estimate") if scale is None else scale
-    time = number(row, "time_per_sample_s")
-    if variance is None or not scale or not time:
-        return None
-    needs = Ladder(number(row, "bias_rms") or 0.0, variance, time).time_to(accuracy * scale)
-    noises = number(row, "time_noise"), number(row, "variance_noise")
-    return needs, uncertainty(needs, time, *noises)
+    expect("volume", isinstance(volume, (str, Path)), "the path of a volume", volume)
+    fits = isinstance(accuracy, (int, float)) and 1e-6 <= accuracy < 1
+    expect("accuracy", fits, "a relative RMSE such as 0.01, from 1e-6 to below 1", accuracy)
+    for name, value in (("budget", budget), ("sigma_t", 1.0 if sigma_t is None else sigma_t)):
+        fits = isinstance(value, (int, float)) and 0 < value < 1e30
+        expect(name, fits, "a number above 0", value)
+    expect("estimand", estimand in ESTIMANDS, f"one of {', '.join(ESTIMANDS)}", estimand)
+    known_renderers = (None, *RENDERERS)
+    expect("renderer", renderer in known_renderers, f"one of {', '.join(RENDERERS)}", renderer)
+    clock, volume = Clock(), Path(volume)
+    medium = {"volume": volume_of(volume, sigma_t, grid=grid, raw=raw)[1]}
+    known = catalog.load(trackers)
+    part = first(api.listed("devices", devices))
+    folder = Path(output) if output else new_folder(f"recommend-{volume.stem[:60]}")
+    own_folder(folder, "recommend")
+    asked = (medium, estimand, accuracy, budget, listener or Listener(), clock, include)
+    search = Search(known, part, folder, *asked, RENDERERS.get(renderer or ""), seed, timeout_s)
+    interrupted = False
+    try:
+        search.run()
+    except KeyboardInterrupt:
+        interrupted = True
+    finally:
+        search.keep()
+    what = f"{estimand} to {100 * accuracy:g} %, on {part.infos[0].label}"
+    lines = ["interrupted; what is known so far:"] if interrupted else []
+    lines += [f"{volume.name}, {what}", search.dense, DEFAULT if sigma_t is None else ""]
+    try:
+        finalists = search.finalists()
+    except RunError as error:
+        if not interrupted:
+            raise
+        return Recommendation(folder, [], [*filter(None, lines), str(error)], None, True)
+    config = search.write(finalists)
+    lines += [*told_of(finalists, search.side), *search.told(finalists, baseline)]
+    lines.append(f"wrote {config}; to look at all of it: freepath report {folder}")
+    cases = [one.case for one in finalists]
+    return Recommendation(folder, cases, [*filter(None, lines)], config, interrupted)
 
 
 def majorants_of(shape: Sequence[int]) -> list[Any]:
@@ -404,3 +532,37 @@ def axes_of(case: plan.Case) -> Axes:
     tightness = 1 if case.tightness is None else case.tightness
     tracker = {case.tracker: dict(case.params)}
     return {"tracker": tracker, "majorant": majorant, "tightness": tightness}
+
+
+def told_of(finalists: Sequence[Finding], side: float) -> list[str]:
+    """The best, how sure that is, and what the others take; a voxel's side is in the world."""
+    best, *others = (one.case for one in finalists)
+    low, high = (best.time_s * max(0.0, 1 + sign * best.noise) for sign in (-1, 1))
+    lines = [
+        f"fastest: {best.case}",
+        f"  {seconds(best.time_s)} of device time per ray "
+        f"(95 %: {seconds(low)} to {seconds(high)})",
+    ]
+    if step := next(iter(finalists[0].axes["tracker"].values())).get("step"):
+        lines.append(f"  its step: {step / side:.3g} x a voxel, {step:.4g} in units of the scene")
+    for place, one in enumerate(others):
+        what = "second" if place == 0 else "then"
+        middle, low, high = map(answers.digits, answers.ratio(one, best))
+        times = f"{middle} ({low} to {high}) times as long" if one.settled else "not known"
+        lines += [f"{what}: {one.case}", f"  {seconds(one.time_s)}, {times}"]
+    return lines
+
+
+def _told_for(renderer: Renderer, best: Finding, search: Search) -> list[str]:
+    """What to set in a renderer, how biased that is, and what it costs not to have the rest."""
+    bias = f"it is biased by {100 * best.case.bias:.1g} %"
+    known = [one.case for one in search.found.values() if one.case.settled]
+    fastest = min(known, key=lambda one: one.time_s)
+    gain = "nothing that was measured is faster"
+    if fastest is not best.case:
+        gain = f"{fastest.name} would be {answers.times_as_fast(best.case, fastest)}"
+    return [
+        f"in {renderer.title}: {renderer.settings(best.axes, search.side)}",
+        f"  {bias if best.case.biased else 'it has no measurable bias'}; of what it lacks: {gain}",
+        f"  settings from {renderer.source}",
+    ]

@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from freepath.measure.ladder import Ladder
 from freepath.show.table import Row, number, settled, soonest, uncertainty
 
 USUAL = ("delta", "global", 1.0)
@@ -68,6 +69,19 @@ def case_of(row: Row, time: tuple[float, float] | None = None) -> Case | None:
     bias = (number(row, "bias_rms") or 0.0) / abs(reference) if reference else 0.0
     parts = row["case"], row["tracker"], row["tracker_label"], row["majorant"], tightness
     return Case(*parts, seconds, noise, bias)
+
+
+def at_accuracy(row: Row, accuracy: float) -> Case | None:
+    """A row with the device seconds per ray to a relative RMSE; None where it does not reach it."""
+    variance, scale = number(row, "variance"), number(row, "reference")
+    scale = number(row, "estimate") if scale is None else scale
+    time = number(row, "time_per_sample_s")
+    if row["status"] != "ok" or variance is None or not scale or not time:
+        return None
+    bias = number(row, "bias_rms") or 0.0
+    needs = Ladder(bias, variance, time).time_to(accuracy * abs(scale))
+    noises = number(row, "time_noise"), number(row, "variance_noise")
+    return case_of(row, (needs, uncertainty(needs, time, *noises)))
 
 
 def baseline_of(cases: Iterable[Case], wanted: str = "") -> Case | None:

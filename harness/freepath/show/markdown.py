@@ -1,8 +1,9 @@
-"""Texts and tables of Markdown that show what is in them as it is."""
+"""Texts and tables of Markdown and HTML that show what is in them as it is."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import html
+from collections.abc import Callable, Iterable, Sequence
 
 from freepath.errors import printable
 
@@ -19,3 +20,13 @@ def table_of(header: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
     lines = (" | ".join(map(text_of, row)) for row in (header, *rows))
     first, *others = (f"| {line} |" for line in lines)
     return [first, "|" + " --- |" * len(header), *others]
+
+
+def html_table(
+    header: Sequence[str], rows: Iterable[Sequence[str]], style: Callable[[str], str] = "".format
+) -> str:
+    """A table of HTML; `style` gives the attributes of a cell, by its text."""
+    head = "".join(f"<th>{html.escape(name)}</th>" for name in header)
+    lines = ([f"<td{style(text)}>{html.escape(text)}</td>" for text in row] for row in rows)
+    body = "".join(f"<tr>{''.join(line)}</tr>" for line in lines)
+    return f"<div><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>"

@@ -249,7 +249,7 @@ def _settled(row: Row) -> bool:
     return high - measured <= CLOSE * measured and measured - low <= CLOSE * measured
 
 
-def _rank(row: Row) -> tuple[int, float]:
+def rank(row: Row) -> tuple[int, float]:
     """The fastest to 1 % first; then what is not known, what never gets there, and what failed."""
     if row["status"] != "ok":
         return 4, 0.0
@@ -288,7 +288,7 @@ def table_of(
     if ratio:
         table.add_column("x baseline", justify="right", no_wrap=True)
     best = best_of(rows)
-    for row in sorted(rows, key=_rank):
+    for row in sorted(rows, key=rank):
         cells = _cells(row, best=row in best)
         table.add_row(*(cells.get(name, "") for name in names), *([ratio(row)] if ratio else []))
     return table

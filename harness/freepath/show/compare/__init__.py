@@ -1,16 +1,10 @@
 """Comparisons of results: what became faster, slower, noisier or different, from CSV alone."""
 
-from freepath.show.compare.judging import REGRESSIONS, VERDICTS, Judged, Settings, compare
-from freepath.show.compare.pairing import Side, load, refuse, unpaired
+from freepath.show.compare.comparison import Comparison, comparison
+from freepath.show.compare.judging import VERDICTS, Judged, Settings, compare
+from freepath.show.compare.pairing import Side, load, on_device_of
 
 __all__ = [
-    "REGRESSIONS",
-    "VERDICTS",
-    "Judged",
-    "Settings",
-    "Side",
-    "compare",
-    "load",
-    "refuse",
-    "unpaired",
-]
+    "VERDICTS", "Comparison", "Judged", "Settings", "Side", "compare", "comparison", "load",
+    "on_device_of",
+]  # fmt: skip

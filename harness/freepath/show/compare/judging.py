@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import stats
 
+from freepath.errors import expect
 from freepath.show.compare.pairing import Key, Side
 from freepath.show.compare.timing import Change, changes
 from freepath.show.table import FAILED, Row, number
@@ -39,6 +40,20 @@ class Settings:
     judge that by the runs, where there are several, and else to take all of it for drift."""
     times: bool = True
     """Whether times are compared."""
+    same_samples: bool = True
+    """Whether the same seed on both sides means the same samples; not of code that draws others."""
+
+    def __post_init__(self) -> None:
+        """Raise UsageError for what is none of these."""
+        for name, least, most, what in (
+            ("alpha", SMALLEST, 1 - 1e-9, "a share between 0 and 1"),
+            ("factor", 1, 1e6, "a ratio of 1 or more"),
+            ("drift", 1, 1e6, "a ratio of 1 or more, or None"),
+        ):
+            value = getattr(self, name)
+            given = 1 if name == "drift" and value is None else value
+            fits = isinstance(given, (int, float)) and least <= given <= most
+            expect(name, fits, what, value)
 
     @property
     def to_show(self) -> float:
@@ -179,7 +194,7 @@ def _shown(one: Judged, pair: _Pair, settings: Settings, level: float, runs: int
         one = replace(one, seen_from=seen, runs=needed)
         beside = ", beside the other cases" if pair.time.shared else ""
         why.append(f"time: no change below x{seen:.3g} would have been seen{beside}")
-    if not _equal(pair.before, pair.after, *SAMPLE, "samples_per_ray"):
+    if not _same(pair, settings, "samples_per_ray"):
         if pair.noise and not pair.noise.within(limit):
             seen = _ratio(pair.noise.seen_from(limit, level))
             why.append(f"variance: no change below x{seen:.3g} would have been seen")
@@ -217,10 +232,10 @@ def _tests(key: Key, pair: _Pair, settings: Settings) -> list[_Test]:
             found += [_Test(key, more, above, what), _Test(key, less, below, what)]
     before, after = pair.before, pair.after
     difference, _, z = _difference(before, after)
-    if _equal(before, after, *SAMPLE, "counted_samples"):
+    if _same(pair, settings, "counted_samples"):
         same = before["lookups_per_sample"] == after["lookups_per_sample"]
         found.append(_Test(key, "DIFFERENT", float(same), "lookups of the same samples"))
-    if _equal(before, after, *SAMPLE, "samples_per_ray"):
+    if _same(pair, settings, "samples_per_ray"):
         same = abs(difference) <= ROUNDING
         found.append(_Test(key, "DIFFERENT", float(same), "estimate of the same samples"))
     elif z is None:
@@ -230,8 +245,10 @@ def _tests(key: Key, pair: _Pair, settings: Settings) -> list[_Test]:
     return found
 
 
-def _equal(before: Row, after: Row, *columns: str) -> bool:
-    return all(before[name] == after[name] for name in columns)
+def _same(pair: _Pair, settings: Settings, count: str) -> bool:
+    """Whether both took the same samples, and as many."""
+    equal = all(pair.before[name] == pair.after[name] for name in (*SAMPLE, count))
+    return settings.same_samples and equal
 
 
 def _noise(key: Key, reference: Side, contender: Side) -> Change | None:

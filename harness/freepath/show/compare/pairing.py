@@ -62,10 +62,11 @@ def load(path: Path) -> Side:
         raise FreepathError(
             f"{path}: expected the folder of a run, with {SUMMARY} in it, or of several runs"
         )
-    return Side(str(path), [_run(folder) for folder in folders])
+    return Side(str(path), [run_of(folder) for folder in folders])
 
 
-def _run(folder: Path) -> Run:
+def run_of(folder: Path) -> Run:
+    """The run in a folder, without cases that were skipped."""
     cases, rounds = read_result(folder)
     rows = {_key(row): row for row in cases if row["status"] != "skipped"}
     times: dict[Key, dict[int, float]] = defaultdict(dict)
@@ -130,6 +131,27 @@ def unpaired(reference: Side, contender: Side) -> str:
 def _listed(values: set[str]) -> str:
     first = sorted(values)[:2]
     return " or ".join(f"'{one}'" for one in first) + (", ..." if len(values) > 2 else "")
+
+
+def on_device_of(reference: Side, contender: Side) -> Side:
+    """The contender as if its device were the reference's, so that the cases of both pair.
+
+    Raises FreepathError where a side has several devices.
+    """
+    places = [{key[1:] for run in side.runs for key in run.rows} for side in (reference, contender)]
+    if any(len(found) != 1 for found in places):
+        names = [" / ".join(place) for found in places for place in sorted(found)]
+        raise FreepathError(f"expected a device on either side, got {', '.join(names)}")
+    (place,) = places[0]
+
+    def moved(found: dict[Key, Any]) -> dict[Key, Any]:
+        return {(key[0], *place): value for key, value in found.items()}
+
+    runs = [
+        Run(moved(one.rows), moved(one.times), moved(one.variances), one.host)
+        for one in contender.runs
+    ]
+    return Side(contender.name, runs)
 
 
 def scenes(run: Run) -> dict[Key, list[Key]]:

@@ -192,24 +192,15 @@ def as_html(reference: str, names: Sequence[str], results: Sequence[Sequence[Jud
     """A page of its own, which loads nothing; several contenders begin with the matrix."""
     parts = [f"<h1>Compared with {html.escape(reference)}</h1><p>{LIMITS}.</p>"]
     if len(names) > 1:
-        parts.append(_html_table(*matrix(names, results)))
+        parts.append(markdown.html_table(*matrix(names, results), _class))
     for name, judged in zip(names, results, strict=True):
         parts.append(f"<h2>{html.escape(name)}</h2><p>{totals(judged)}</p>")
-        parts.append(_html_table(HEADER, [cells(one) for one in judged]))
+        parts.append(markdown.html_table(HEADER, [cells(one) for one in judged], _class))
     return (
         '<!doctype html><html lang="en"><meta charset="utf-8"><meta name="viewport" '
         f'content="width=device-width"><title>freepath compare</title><style>{STYLE}</style>'
         f"{''.join(parts)}</html>\n"
     )
-
-
-def _html_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    head = "".join(f"<th>{html.escape(name)}</th>" for name in header)
-    body = "".join(
-        "<tr>" + "".join(f"<td{_class(text)}>{html.escape(text)}</td>" for text in row) + "</tr>"
-        for row in rows
-    )
-    return f"<div><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>"
 
 
 def _class(text: str) -> str:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from freepath.errors import FreepathError
+from freepath.errors import FreepathError, NothingMatchedError
 from freepath.measure.ladder import Ladder
 from freepath.results.folder import (
     CHECKS,
@@ -66,22 +67,34 @@ class Report:
         return list(dict.fromkeys(row[name] for row in self.rows))
 
 
-def load(results: Sequence[Path]) -> Report:
-    """Read results; raises FreepathError where one of them cannot be read."""
+def load(results: Sequence[Path], only: str = "", question: str = "") -> Report:
+    """Read results; raises FreepathError where one of them cannot be read.
+
+    Of cases whose name matches the expression `only`, and questions that match `question`; raises
+    NothingMatchedError where these leave none.
+    """
     report = Report()
-    given = [(name, path, _summary(path)) for name, path in _named(results)]
+    given = [
+        (name, path, [row for row in read_summary(path) if re.search(only, row["case"])])
+        for name, path in _named(results)
+    ]
     devices = _devices([(name, row) for name, _, rows in given for row in rows])
     for name, path, rows in given:
         methods = _variants(rows)
         records = {}
         for row in rows:
             record = _record(row, methods, devices[name, _device(row)])
+            if not re.search(question, record["q"]):
+                continue
             records[row["case_id"], row["device"], row["platform"]] = record
             report.rows.append(record)
         report.places.append((path, records))
         report.runs.append({"name": name, "checks": _checks(path)} | facts(path / RUN))
-    for question in report.values("q"):
-        _span([row for row in report.measured if row["q"] == question])
+    if (only or question) and not report.rows:
+        asked = f"'{only}' and '{question}'" if only and question else f"'{only or question}'"
+        raise NothingMatchedError(f"no case of {results[0]} matches {asked}")
+    for one in report.values("q"):
+        _span([row for row in report.measured if row["q"] == one])
     for number_, row in enumerate(report.rows):
         row["id"] = number_
     labels = {row["label"] for row in report.rows}
@@ -101,7 +114,8 @@ def _named(results: Sequence[Path]) -> list[tuple[str, Path]]:
     ]
 
 
-def _summary(result: Path) -> list[Row]:
+def read_summary(result: Path) -> list[Row]:
+    """The rows of a result; raises FreepathError where the folder holds none."""
     summary = result / SUMMARY
     if not summary.is_file():
         raise FreepathError(f"{result}: expected the folder of a run, with {SUMMARY} in it")

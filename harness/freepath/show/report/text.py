@@ -1,8 +1,9 @@
-"""A report as Markdown, and as small tables for a terminal."""
+"""A report as Markdown, as tables of LaTeX, and as small tables for a terminal."""
 
 from __future__ import annotations
 
 import math
+import re
 from typing import Any
 
 from rich.markup import escape
@@ -18,7 +19,7 @@ from freepath.show.answers import (
 )
 from freepath.show.markdown import table_of as table_lines
 from freepath.show.markdown import text_of
-from freepath.show.report.data import LADDER, Report, answered, known_to
+from freepath.show.report.data import LADDER, Report, answered, known_to, late
 from freepath.show.table import FAILED, marked, seconds, short, soonest
 
 ACCURACIES = dict(zip(LADDER, (0.1, 0.01, 0.001), strict=True))
@@ -150,6 +151,45 @@ def markdown(report: Report, baseline: str = "") -> str:
     lines += ["", "## Environment", ""]
     facts = [[key, value] for run in report.runs for key, value in environment(run)]
     lines += table_lines(["", ""], facts)
+    return "\n".join(lines) + "\n"
+
+
+LATEX = {c: f"\\{c}" for c in "&%$#_{}"} | {
+    "\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}",
+    "<": r"\textless{}", ">": r"\textgreater{}", "±": r"$\pm$", "|": r"\textbar{}", "\n": " ",
+}  # fmt: skip
+
+
+def latex_of(text: str) -> str:
+    """A text that LaTeX shows as it is, with a thin space before a unit."""
+    shown = text.translate(str.maketrans(LATEX))
+    return re.sub(r"(\d) (u?)(s|ms|ns|ps|\\%)$", _unit, shown)
+
+
+def _unit(found: re.Match[str]) -> str:
+    micro = r"$\mu$" if found[2] else ""
+    return rf"{found[1]}\,{micro}{found[3]}"
+
+
+def latex(report: Report, baseline: str = "") -> str:
+    """A table of booktabs for each question, the fastest first, with its answer as caption."""
+    told = dict(zip(report.values("q"), [""] * len(report.rows), strict=False))
+    for one in answers(report, baseline):
+        told[one["q"]] += f" {one['cards']['t1']['sentence']}"
+    several = len(report.values("device")) > 1
+    shown = [place for place, name in enumerate(HEADER) if several or name != "device"]
+    lines = ["% needs \\usepackage{booktabs}"]
+    for question, sentence_ in told.items():
+        rows = [row for row in report.rows if row["q"] == question]
+        texts = [HEADER, *(cells(row) for row in sorted(rows, key=late))]
+        head, *body = (" & ".join(latex_of(row[p]) for p in shown) + r" \\" for row in texts)
+        lines += [
+            r"\begin{table}",
+            rf"\caption{{{latex_of(question)}.{latex_of(sentence_)}}}",
+            rf"\begin{{tabular}}{{{'l' * (1 + several)}{'r' * (len(shown) - 1 - several)}}}",
+            r"\toprule", head, r"\midrule", *body, r"\bottomrule",
+            r"\end{tabular}", r"\end{table}",
+        ]  # fmt: skip
     return "\n".join(lines) + "\n"
 
 
