@@ -34,7 +34,7 @@ class AlongRays:
         self.sigma = flight.medium.sigma_t(points.reshape(-1, 3)).reshape(t.shape)
         case = flight.case
         self.params = case.params
-        control = case.params if "control" in case.params else None
+        control = case.params if "control" in flight.tracker.needs else None
         self._model, self._cells = case.majorant, np.array((1, 1, 1))
         if case.majorant is None:
             return
