@@ -85,7 +85,7 @@ REFUSED = {
     "types": ("v.tif", [small(2, 3), small(2, 3).astype(np.uint8)], "slice 1 is 3 x 2 uint8"),
     "channels": ("v.exr", [small(2, 3, 3)], "slice 0 has 3 channels (R, G, B), expected one"),
     "later channels": ("v.tif", [small(2, 3), small(2, 3, 4)], "slice 1 has 4 channels"),
-    "format": ("v.png", [small(2, 3).astype(np.uint8)], "expected .npy, EXR, TIFF or OpenVDB, got"),
+    "format": ("v.png", [small(2, 3).astype(np.uint8)], "expected .npy, EXR, TIFF, OpenVDB"),
 }
 
 
