@@ -84,9 +84,8 @@ class Check:
 
     @property
     def in_tests(self) -> bool:
-        """Whether the tests run it too: not what takes minutes, nor what is slow of FURTHER."""
-        further = "slow" in self.labels and FURTHER.intersection(self.labels)
-        return "minutes" not in self.labels and not further
+        """Whether the tests run it too: what is fast."""
+        return "fast" in self.labels
 
 
 def majorant_of(tracker: Tracker, wanted: str = "grid") -> str:

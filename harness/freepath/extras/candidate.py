@@ -81,7 +81,8 @@ def checks_of(known: Catalog, tracker: Tracker, *, every: bool) -> list[tuple[in
     return [
         (number, check)
         for number, check in enumerate(registry.checks(known), 1)
-        if tracker.name in check.labels and (every or "fast" in check.labels) and check.in_tests
+        if tracker.name in check.labels
+        and (check.in_tests or (every and "minutes" not in check.labels))
     ]
 
 
