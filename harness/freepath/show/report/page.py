@@ -174,7 +174,7 @@ def _library() -> str:
         import platformdirs
 
         folder = platformdirs.user_cache_dir("freepath")
-    path = Path(folder) / f"vega-{vl_convert.__version__}.js"
+    path = Path(folder) / f"vega-{vl_convert.__version__}.sealed"
     with contextlib.suppress(OSError, UnicodeDecodeError):
         seal, _, text = path.read_text("utf-8").partition("\n")
         if seal == hashlib.sha256(text.encode()).hexdigest():
