@@ -9,14 +9,18 @@ BIN := $(VENV)/bin
 KIT_PYTHON ?=
 KIT_OPTIONS ?=
 
-.PHONY: sweep test devices kit lint schema clean
+.PHONY: sweep test test-slow devices kit lint schema clean
 
 sweep: $(VENV)/installed
 	$(BIN)/python -m freepath.extras.device_setup --if-needed
 	$(BIN)/freepath run quick
 
 test: $(VENV)/installed-for-tests
-	$(BIN)/python -m pytest -n auto --dist loadfile
+	$(BIN)/python -m pytest -n auto --dist loadfile -m "not slow"
+
+# The tests of all drivers and of large tables, which `make test` leaves out.
+test-slow: $(VENV)/installed-for-tests
+	$(BIN)/python -m pytest -n auto --dist loadfile -m slow
 
 # OpenCL drivers that need no special hardware: by apt where this is root, and by pip. What cannot be
 # had is said, and the others are installed all the same.

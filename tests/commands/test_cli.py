@@ -269,6 +269,7 @@ static void step(Path *path, const Scene *scene, Rng *rng) {}
     assert mine["needs"] == "nothing"
 
 
+@pytest.mark.slow
 def test_devices(call, device):
     code, out, _ = call("devices")
     assert code == 0

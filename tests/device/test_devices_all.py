@@ -10,6 +10,7 @@ import pytest
 from freepath.device import drivers
 from support.flights import DEFECTS, chosen_cases, name_of
 
+pytestmark = pytest.mark.slow
 NAMES = [driver.name for driver in drivers.DRIVERS]
 TRACKERS = sorted({axes["tracker"] for axes in chosen_cases()})
 RARE = 0.03  # samples that the last bit of a logarithm may send another way

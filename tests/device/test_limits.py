@@ -127,6 +127,7 @@ stop: {{samples: 400}}
     return run
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("estimand", "sizes", "beyond"),
     [

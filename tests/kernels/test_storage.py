@@ -174,6 +174,7 @@ def rows(tmp_path_factory, device):
     return found
 
 
+@pytest.mark.slow
 def test_the_bias_is_that_of_rounding_and_no_mismatch(rows):
     """The reference is of the densities as they are; a tracker is held to what it reads."""
     length = 4 * 0.05

@@ -469,6 +469,7 @@ SLACK = 4
 FIRST = "document.querySelector('#figure-cost canvas') && document.querySelector('#body tr')"
 
 
+@pytest.mark.slow
 def test_ten_thousand_rows(work, selector, browser):
     """Built in 5 s, open in 2 s: the first chart is drawn, and the table can be used."""
     (work / "x.yaml").write_text(
