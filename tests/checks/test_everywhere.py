@@ -16,6 +16,8 @@ from freepath.device.drivers import Driver
 from freepath.device.selection import Part
 from freepath.errors import DriverLimitError
 
+pytestmark = pytest.mark.slow
+
 READS_NOTHING = """/*---
 title: A tracker that reads what nobody has written
 estimands: [transmittance]

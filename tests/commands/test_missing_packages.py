@@ -7,8 +7,10 @@ import sys
 import numpy as np
 import pytest
 
+pytestmark = pytest.mark.slow
 BLOCKING = """\
 import sys
+
 class Blocked:
     def find_spec(self, name, path=None, target=None):
         if name.partition(".")[0] in ("OpenImageIO", "altair", "vl_convert"):

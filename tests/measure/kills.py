@@ -36,7 +36,14 @@ ENDS = {
     "hangs": ("timeout", ["-a", "tracker=delta,hangs", "-a", "tightness=1", "--timeout", "4"]),
     "aborts": ("crashed", ["-a", "tracker=delta,aborts", "-a", "tightness=1"]),
 }
-DIFFER = ("time", "inv_efficiency_s", "lookups_per_s", "run_id", "device_time_share")
+DIFFER = (
+    "time",
+    "inv_efficiency_s",
+    "figure_of_merit",
+    "lookups_per_s",
+    "run_id",
+    "device_time_share",
+)
 DIFFER += ("lane_occupancy",)  # which lane takes which unit depends on threads
 
 

@@ -22,6 +22,8 @@ from freepath.errors import DeviceError, ResultError, RunError, UsageError
 from freepath.measure import cluster, worker
 from freepath.results.folder import SAMPLE_COLUMNS, read_rows
 
+pytestmark = pytest.mark.slow
+
 pytest.importorskip("distributed")
 CONFIG = """name: far
 rays: {orthographic: {resolution: 4}}
@@ -31,7 +33,14 @@ matrix:
 stop: {samples: 64, rounds: 2}
 """
 MINE = FRONT.format("is sent as text", "collide(path, path->live);")
-DIFFER = ("time", "inv_efficiency_s", "lookups_per_s", "run_id", "device_time_share")
+DIFFER = (
+    "time",
+    "inv_efficiency_s",
+    "figure_of_merit",
+    "lookups_per_s",
+    "run_id",
+    "device_time_share",
+)
 DIFFER += ("lane_occupancy", "work_items")  # a worker has one thread
 
 

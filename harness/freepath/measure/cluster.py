@@ -497,6 +497,7 @@ class Cluster:
         if row["source_sha256"] != job.row["source_sha256"] or tuple(row) != COLUMNS:
             raise RunError(f"worker {errand.address} composes other sources: of another freepath?")
         del errand.left[row["case_id"]]
+        row["inputs"] = job.row["inputs"]  # there the copy of a file has another name
         self._sweep.finish(row, *said["further"])
 
     def _done(self, errand: Errand, there: dict[str, Message]) -> list[list[Job]]:

@@ -314,9 +314,17 @@ def texts(row: Mapping[str, Any], columns: tuple[str, ...]) -> dict[str, str]:
     return cells | {name: no_formula(printable(cells[name])) for name in TEXTS & cells.keys()}
 
 
+FORMULA = ("=", "+", "-", "@", "\t", "\r")
+
+
 def no_formula(text: str) -> str:
     """A text that no spreadsheet takes for a formula."""
-    return f"'{text}" if text[:1] in ("=", "+", "-", "@", "\t", "\r") else text
+    return f"'{text}" if text.startswith(FORMULA) else text
+
+
+def _unquoted(text: str) -> str:
+    """What `no_formula` was given."""
+    return text[1:] if text[:1] == "'" and text.startswith(FORMULA, 1) else text
 
 
 def _text(value: Any) -> str:
@@ -332,7 +340,10 @@ def read_rows(path: Path, columns: tuple[str, ...] = COLUMNS) -> list[Row]:
 
     Raises FreepathError, with file, line and column, for what no run has written.
     """
-    return reading.rows(path, columns, TEXTS, SCHEMA_VERSION)
+    found = reading.rows(path, columns, TEXTS, SCHEMA_VERSION)
+    for row in found:
+        row.update((name, _unquoted(row[name])) for name in TEXTS & row.keys())
+    return found
 
 
 def read_result(folder: Path) -> tuple[list[Row], list[Row]]:

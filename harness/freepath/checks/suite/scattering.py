@@ -70,11 +70,11 @@ def homogeneous(sigma_t: float = 2.0, **keys: Any) -> dict[str, Any]:
     return {"homogeneous": {"sigma_t": sigma_t, **keys}}
 
 
-def furnace(rig: Rig, alpha: float, tracker: str, kind: str, **keys: Any) -> None:
+def furnace(rig: Rig, alpha: float, tracker: str, kind: str, shape: Any = (), **keys: Any) -> None:
     """In a furnace without absorption every path brings the same, whatever it meets: a weight that
     drifts, a path that is lost or a direction off by a little shows at once."""
     # Every path brings the environment's radiance, but for roundings of weights.
-    keys["albedo"] = 1
+    keys |= {"albedo": 1, **dict(shape)}
     if kind == "stretched":
         # directions are turned in the world, where voxels need not be cubes
         keys["size"] = [1, 3, 0.5]
@@ -279,8 +279,8 @@ for (phase, g), depth in itertools.product(PHASES.items(), (1, 10, 100)):
     for kind in ("homogeneous", "grid"):
         name, keys = f"furnace/{kind}-tau-{depth}-{phase}/delta", {"sigma_t": depth, "g": g}
         _one(name, "delta", furnace, kind=kind, **keys)
-keys = {"sigma_t": 10, "phase": "draine", "g": -0.9, "alpha": 20}
-_one("furnace/draine/regular", "regular", furnace, kind="grid", **keys)
+shape = {"phase": "draine", "g": -0.9, "alpha": 20}
+_one("furnace/draine/regular", "regular", furnace, kind="grid", shape=shape, sigma_t=10)
 for kind in ("grid", "stretched"):
     _one(f"furnace/{kind}/regular", "regular", furnace, kind=kind, sigma_t=30, g=0.9)
 for tracker, shadow in (*TOGETHER, *((name, "ratio") for name in NEAR_TRACKERS)):
