@@ -77,9 +77,9 @@ def test_the_baseline():
 
 
 def test_a_run_ends_with_the_sentence_that_its_table_has(work, selector, capsys):
-    """To the last digit of the column, in 80 columns."""
+    """To the last digit of the column, in 80 columns; the baseline is slow on any busy machine."""
     (work / "x.yaml").write_text(SWEEP)
-    assert main(["run", "x.yaml", "-o", "out", "-d", selector]) == 0
+    assert main(["run", "x.yaml", "-o", "out", "-d", selector, "--baseline", "t4/delta"]) == 0
     printed = capsys.readouterr().out.splitlines()
     (told,) = [line for line in printed if line.startswith("At 1 %: ")]
     found = re.match(r"At 1 %: (\w+), global, tightness (\d) is ([\d.]+) \(", told)
@@ -91,7 +91,7 @@ def test_a_run_ends_with_the_sentence_that_its_table_has(work, selector, capsys)
     assert all(len(line) <= 80 for line in printed[start : start + 6])
     with Path("out/summary.csv").open() as file:
         times = {row["case"]: float(row["time_to_1pct_s"]) for row in csv.DictReader(file)}
-    delta = next(time for name, time in times.items() if "/t1/delta" in name)
+    delta = next(time for name, time in times.items() if "/t4/delta" in name)
     assert float(found[3]) == pytest.approx(delta / min(times.values()), rel=0.1)
     for words in (["--baseline", "none such"], ["--baseline", "t4/delta"]):
         code = main(["run", "x.yaml", "-o", "out", "--resume", "-d", selector, *words])
