@@ -27,7 +27,7 @@ SOURCES = (
     "README.md",
     "LICENSE",
 )
-LEFT_OUT = ("OpenImageIO",)
+LEFT_OUT = ("OpenImageIO", "imagecodecs")
 """Requirements of pictures and images alone: each would be as large as half of the kit."""
 PLATFORMS = ("_2_28", "_2_27", "_2_26", "_2_24", "_2_17", "2014", "_2_12", "2010", "_2_5", "1")
 """Of manylinux, from the newest that a machine of 2019 runs (glibc 2.28) down to the oldest."""
