@@ -18,7 +18,7 @@ sweep: $(VENV)/installed
 test: $(VENV)/installed-for-tests
 	$(BIN)/python -m pytest -n auto --dist loadfile -m "not slow"
 
-# The tests of all drivers and of large tables, which `make test` leaves out.
+# Those that take long: of all drivers, planted defects, pictures, new trackers and large tables.
 test-slow: $(VENV)/installed-for-tests
 	$(BIN)/python -m pytest -n auto --dist loadfile -m slow
 

@@ -6,6 +6,8 @@ from checks.support import CHECKS
 from freepath.checks.defects import DEFECTS, Defect, caught
 from freepath.checks.rig import Change
 
+pytestmark = pytest.mark.slow
+
 BY_NAME = {check.name: check for check in CHECKS}
 
 

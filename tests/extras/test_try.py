@@ -18,6 +18,8 @@ from freepath.extras import candidate
 from freepath.results.folder import COLUMNS
 from support.slips import BEGINS, DECIDES, NAME, RIGHT, SLIPS, STEPS
 
+pytestmark = pytest.mark.slow
+
 KEY = "threshold: {default"
 
 

@@ -13,6 +13,8 @@ from freepath.measure.stats import Moments
 from freepath.results.folder import CONFIRM_COLUMNS, read_rows
 from freepath.show import table
 
+pytestmark = pytest.mark.slow
+
 SWEEP = """\
 name: small
 seed: 3

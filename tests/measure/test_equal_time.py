@@ -13,6 +13,8 @@ from freepath.results.folder import read_rows
 from freepath.show.report import load
 from freepath.show.report.renders import Render, panels, reference_of, rmse_of
 
+pytestmark = pytest.mark.slow
+
 CONFIG = """\
 name: pictures
 render: true

@@ -14,6 +14,8 @@ from freepath.measure import pictures
 from freepath.measure.stats import Moments
 from freepath.results.folder import read_rows
 
+pytestmark = pytest.mark.slow
+
 RENDER = """\
 name: pictures
 render: true
