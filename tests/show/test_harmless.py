@@ -45,6 +45,7 @@ def test_rows_command_no_terminal_and_no_spreadsheet(tmp_path):
     folder.append(row | {"status": "build_failed"})
     folder.close()
     assert folder.rows()[0]["reason"] == cells["reason"]
+    assert folder.rows()[0]["device"] == row["device"]
 
 
 @pytest.mark.parametrize("name", ["=cmd", "+1", "-x", "@sum", "\tx"])
